@@ -381,3 +381,20 @@ def test_a_mesh_in_millimetres_is_told(tmp_path: Path) -> None:
 
     assert told(1.0) == [("implausible-size", 'net "n".mesh'), ("implausible-size", 'collider "c".shape.mesh')]
     assert told(0.001) == []
+
+
+def test_convex_parts_that_fill_more_than_their_mesh_are_told(tmp_path: Path) -> None:
+    outline = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (0, 2)]
+    corners = [f"v {x} {y} {z}" for z in (0, 1) for x, y in outline]
+    lids = [f"f {a} {c} {b}\nf {a + 6} {b + 6} {c + 6}" for a, b, c in ((1, 2, 3), (1, 3, 4), (1, 4, 6), (4, 5, 6))]
+    sides = [f"f {i + 1} {(i + 1) % 6 + 1} {(i + 1) % 6 + 7} {i + 7}" for i in range(6)]
+    (tmp_path / "l.obj").write_text("\n".join(corners + lids + sides))
+
+    def told(most: int) -> list[tuple[str, str]]:
+        concave = {"mesh": {"path": str(tmp_path / "l.obj")}, "most": most}
+        scene = {"version": 1, "body": [{"name": "l", "shape": {"concave": concave}}]}
+        return [(w["code"], w["path"]) for w in World(scene).warnings]
+
+    # The hull of an L exceeds it by a quarter; two boxes are it.
+    assert told(1) == [("coarse-parts", 'body "l".shape')]
+    assert told(2) == []

@@ -166,6 +166,56 @@ fn a_ball_that_is_thrown_slides_and_then_rolls() {
     assert!((x - exact).abs() < 5e-3 * way, "{x} of {exact} m");
 }
 
+#[test]
+fn what_rolls_is_stopped_as_its_rolling_friction_says() {
+    let (mu, v) = (0.1, 1.5);
+    // With the moment of inertia c m R² about its centre it slows down by mu g/(1 + c).
+    for (shape, c) in [("{ sphere = { radius = 0.1 } }", 0.4), ("{ cylinder = { radius = 0.1, height = 0.2 } }", 0.5)] {
+        let words = format!(
+            "shape = {shape}\nposition = [[0, 0, 0.1]]\nrotate = [[90, 0, 0]]\nvelocity = [[{v}, 0, 0]]\nangular_velocity = [[0, {}, 0]]\n\
+             friction = 0.5\nrolling_friction = {mu}",
+            v / 0.1
+        );
+        let mut sim = scene(DOWN, 5, &(body("thing", &words) + &floor(0.5, 0.0)));
+        let slows = mu * G / (1.0 + c);
+        run(&mut sim, 100);
+        let speed = column(&sim, "thing", "velocity")[0].x;
+        assert!((speed - (v - slows)).abs() < 5e-3 * slows, "{shape}: {speed} of {} m/s", v - slows);
+        run(&mut sim, (100.0 * v / slows) as usize - 95);
+        let (x, v_end) = (column(&sim, "thing", "position")[0].x, column(&sim, "thing", "velocity")[0]);
+        let way = v * v / (2.0 * slows);
+        assert!((x - way).abs() < 5e-3 * way && v_end.norm() < 1e-6, "{shape}: {x} of {way} m, {v_end:?}");
+    }
+}
+
+#[test]
+fn a_ball_rests_on_slopes_up_to_the_tangent_of_its_rolling_friction() {
+    let mu = 0.1;
+    for (tan, rolls) in [(0.098, false), (0.102, true), (0.3, true)] {
+        let a = f64::atan(tan);
+        let words = format!("shape = {{ sphere = {{ radius = 0.1 }} }}\nposition = [[0, 0, 0.1]]\nfriction = 0.8\nrolling_friction = {mu}");
+        let mut sim = scene([G * a.sin(), 0.0, -G * a.cos()], 5, &(body("ball", &words) + &floor(0.0, 0.0)));
+        run(&mut sim, 100);
+        let v = column(&sim, "ball", "velocity")[0].x;
+        let exact = if rolls { 5.0 / 7.0 * G * (a.sin() - mu * a.cos()) } else { 0.0 };
+        assert!((v - exact).abs() < 5e-3 * exact + 1e-6, "tan a = {tan}: {v} of {exact} m/s");
+    }
+}
+
+#[test]
+fn what_rolls_goes_on_to_the_same_bits_from_a_snapshot() {
+    let words = "shape = { sphere = { radius = 0.1 } }\nposition = [[0, 0, 0.1], [0.15, 0, 0.3]]\nvelocity = [[1, 0.3, 0]]\nfriction = 0.5\nrolling_friction = 0.05";
+    let mut sim = scene(DOWN, 5, &(body("balls", words) + &floor(0.5, 0.0)));
+    run(&mut sim, 40);
+    let kept = sim.save(&[]);
+    run(&mut sim, 40);
+    let mut again = scene(DOWN, 5, &(body("balls", words) + &floor(0.5, 0.0)));
+    again.restore(&kept).unwrap();
+    run(&mut again, 40);
+    assert_eq!(column(&sim, "balls", "position"), column(&again, "balls", "position"));
+    assert_eq!(turns(&sim, "balls"), turns(&again, "balls"));
+}
+
 /// A box that is pushed along the diagonal, and 25 balls on it: an elliptic cone of friction lets it go, a pyramid does not. Figures of SimBenchmark.
 #[test]
 fn balls_on_a_box_that_is_pulled_along_the_diagonal() {
@@ -288,7 +338,8 @@ fn momentum_and_angular_momentum_stay_where_nothing_else_is() {
 
 /// Twelve boxes that meet, by passes and by bounces.
 fn conserved(restitution: f64) {
-    let mut words = format!("restitution = {restitution}\nshape = {{ box = {{ size = [0.3, 0.2, 0.25] }} }}\nposition = [");
+    let mut words =
+        format!("restitution = {restitution}\nrolling_friction = 0.2\nshape = {{ box = {{ size = [0.3, 0.2, 0.25] }} }}\nposition = [");
     (0..12).for_each(|k| {
         write!(words, "[{}, {}, {}], ", 0.4 * f64::from(k % 3), 0.37 * f64::from(k / 3 % 2), 0.41 * f64::from(k / 6)).unwrap()
     });

@@ -8,12 +8,14 @@
 mod common;
 
 mod animated;
+mod arranged;
 mod bending;
 mod broken;
 mod chains;
 mod character;
 mod clamps;
 mod cloth;
+mod compounds;
 mod contact;
 mod contact_cost;
 mod contact_sweep;

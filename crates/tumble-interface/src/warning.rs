@@ -63,6 +63,8 @@ codes! {
     StiffContact = "stiff-contact",
     /// A joint far from the bodies that it holds.
     FarJoint = "far-joint",
+    /// Convex parts that fill more than the mesh that they stand for.
+    CoarseParts = "coarse-parts",
     /// Systems that do not come to agree about the impulses between them.
     Disagreement = "disagreement",
     /// A pattern of another area than its mesh.

@@ -15,7 +15,7 @@ pub struct Body {
     pub system: Option<String>,
     /// Their shape. Whatever its origin, their positions are those of the centre of mass.
     pub shape: BodyShape,
-    /// Position of the centre of mass of each body; with `arrange`, of the first.
+    /// Position of the centre of mass of each body; with `arrange`, of the first, unless that says otherwise.
     #[serde(default = "origin")]
     #[schemars(length(min = 1), extend("x-unit" = "m"))]
     pub position: Vec<[f64; 3]>,
@@ -58,6 +58,11 @@ pub struct Body {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction_static: Option<f64>,
+    /// Largest moment against rolling, over the normal force and the distance of the centre of mass from the plane of contact: a ball or a cylinder rests
+    /// on slopes up to that tangent. A steel ball on steel has 0.001, a ball on grass 0.05. Of two bodies that touch, the larger moment holds.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub rolling_friction: f64,
     /// Speed after a bounce over speed before. Of two surfaces that touch, the larger one holds.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
@@ -125,8 +130,108 @@ pub enum BodyShape {
         #[schemars(length(min = 4), extend("x-unit" = "m"))]
         points: Vec<[f64; 3]>,
     },
+    /// A stone of an arch: the part of a ring about y between two planes through its axis, with flat faces. The arrangement `arch` makes an arch of it.
+    Voussoir {
+        /// Mean radius of the arch.
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        radius: f64,
+        /// Thickness of the arch, below twice its mean radius.
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        thickness: f64,
+        /// Width of the arch along y.
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        width: f64,
+        /// Stones of the arch.
+        #[schemars(range(min = 3, max = 10_000))]
+        stones: u32,
+        /// Angle that all of them span.
+        #[serde(default = "half_turn")]
+        #[schemars(range(max = 360.0), extend("x-unit" = "°", "exclusiveMinimum" = 0.0))]
+        span: f64,
+    },
     /// The convex hull of a mesh from a file; pictures show the mesh itself.
     Mesh(MeshFile),
+    /// A closed mesh from a file as it is, with its hollows: a ring, a cup, a hook. Rigid bodies and colliders meet it as convex parts, which are found
+    /// when the run starts.
+    Concave {
+        /// The mesh.
+        mesh: MeshFile,
+        /// The part of the mesh's volume by which all parts together may exceed it: less takes more parts, and more time.
+        #[serde(default = "close")]
+        #[schemars(range(max = 1.0), extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+        tolerance: f64,
+        /// Parts at most, whatever the tolerance.
+        #[serde(default = "many")]
+        #[schemars(range(min = 1, max = 1000))]
+        most: u32,
+    },
+    /// Several shapes that are one body. Its mass, centre of mass and moments of inertia are those of all parts; where they overlap, each counts.
+    Compound {
+        /// The parts.
+        #[schemars(length(min = 1))]
+        parts: Vec<BodyPart>,
+    },
+}
+
+impl BodyShape {
+    /// The meshes from files in it, each with its key.
+    pub fn mesh_files_mut(&mut self) -> Vec<(String, &mut MeshFile)> {
+        match self {
+            Self::Mesh(mesh) => vec![(".mesh".into(), mesh)],
+            Self::Concave { mesh, .. } => vec![(".concave.mesh".into(), mesh)],
+            Self::Compound { parts } => {
+                let files = parts.iter_mut().enumerate().flat_map(|(i, part)| {
+                    let files = part.shape.mesh_files_mut().into_iter();
+                    files.map(move |(key, mesh)| (format!(".compound.parts[{i}].shape{key}"), mesh))
+                });
+                files.collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// A part of a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BodyPart {
+    /// Its shape.
+    pub shape: BodyShape,
+    /// Where the origin of its shape is in the axes of the body: the middle of a ball, box, capsule, cylinder or cone.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub position: [f64; 3],
+    /// Rotation about x, then y, then z.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+    /// Its density. Default: that of the body.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
+    pub density: Option<f64>,
+}
+
+fn close() -> f64 {
+    0.03
+}
+
+fn many() -> u32 {
+    32
+}
+
+fn half_turn() -> f64 {
+    180.0
+}
+
+impl Body {
+    /// How many bodies there are.
+    pub fn count(&self) -> f64 {
+        match (&self.arrange, &self.shape) {
+            (Some(Arrange::Arch {}), BodyShape::Voussoir { stones, .. }) => f64::from(*stones),
+            (Some(arrange), _) => arrange.count(),
+            (None, _) => self.position.len() as f64,
+        }
+    }
 }
 
 /// Copies of a body.
@@ -157,14 +262,44 @@ pub enum Arrange {
         #[schemars(range(min = 1, max = 100_000))]
         rows: u32,
     },
+    /// One after the other, each turned about the way to it, as the links of a chain are; a `[[joint]]` with `chain = true` joins neighbours.
+    Chain {
+        /// How many.
+        #[schemars(range(min = 1, max = 1_000_000))]
+        count: u32,
+        /// From each to the next.
+        #[schemars(extend("x-unit" = "m"))]
+        step: [f64; 3],
+        /// Turn of each from the one before, about `step`.
+        #[serde(default = "quarter_turn")]
+        #[schemars(extend("x-unit" = "°"))]
+        twist: f64,
+    },
+    /// The stones of an arch, of shape `voussoir`, side by side in the plane of x and z from left to right. `position` is the centre of its circle,
+    /// `rotate` turns the arch as a whole.
+    Arch {},
+    /// Strewn at random in a box about `position`, without touching; determined by seed and name. All turns are as likely, unless `rotate` is given.
+    Scatter {
+        /// How many.
+        #[schemars(range(min = 1, max = 1_000_000))]
+        count: u32,
+        /// Edges of the box, in which they are as a whole.
+        #[schemars(transform = items_above_zero, extend("x-unit" = "m"))]
+        size: [f64; 3],
+    },
+}
+
+fn quarter_turn() -> f64 {
+    90.0
 }
 
 impl Arrange {
-    /// How many bodies there are.
-    pub fn count(&self) -> f64 {
+    /// How many bodies there are, unless their shape says it.
+    fn count(&self) -> f64 {
         match self {
-            Self::Row { count, .. } | Self::Stack { count } => f64::from(*count),
+            Self::Row { count, .. } | Self::Stack { count } | Self::Chain { count, .. } | Self::Scatter { count, .. } => f64::from(*count),
             Self::Wall { columns, rows } => f64::from(*columns) * f64::from(*rows),
+            Self::Arch {} => 1.0,
         }
     }
 }

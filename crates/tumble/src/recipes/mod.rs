@@ -4,8 +4,11 @@
 //! not depend on how finely a thing is divided; the links of a family in one direction together stand for the whole thing
 //! once.                                                               (springs.8)
 
+mod arrange;
 mod block;
+mod body_shape;
 mod cloth;
+mod convex_parts;
 mod cut;
 mod dress;
 mod emitter;

@@ -1,78 +1,40 @@
 //! Rigid bodies: shapes, masses and inertia, and where copies stand.
 
-use crate::geometry::{Collider, Facets, Friction, Shape, Vector, surface};
+use super::arrange::{Place, Wrong, each, places};
+use super::body_shape::{Solid, solid};
+use crate::geometry::{Collider, Facets, Friction, Shape, Vector};
 use crate::math::Quat;
 use crate::math::rotation::from_degrees;
 use crate::systems::rigid::{Body, Hull, pose};
-use parry3d_f64::math::{Pose, Vector as V};
-use parry3d_f64::shape::SharedShape;
+use parry3d_f64::math::Pose;
 use tumble_interface::Mesh;
-use tumble_interface::scene::{Arrange, Body as Words, BodyShape};
+use tumble_interface::scene::{Body as Words, BodyShape, MeshFile};
 
-/// Flat sides around what is round, in pictures.
-const SIDES: u32 = 48;
-
-/// Bodies of an object: their surface, that which masses of other systems touch, that for pictures, and their states.
+/// Bodies of an object.
 pub struct Made {
-    pub hull: Hull,
+    form: Solid,
+    /// From the axes of the words to those of a body.
+    own: Pose,
+    /// Their surface, where what is hollow is filled.
+    pub outline: Hull,
+    /// That which masses of other systems touch.
     pub solid: Collider,
+    /// That for pictures.
     pub mesh: Mesh,
+    /// Their states.
     pub bodies: Vec<Body>,
 }
 
-/// What is wrong with which key.
-type Wrong = (String, String);
-
-/// The solid in the axes of its words, and its surface for pictures.
-fn solid(words: &BodyShape, file: Option<&Mesh>) -> Result<(SharedShape, Pose, Mesh), Wrong> {
-    let zero = Vector::default();
-    // Axes of y become those of z.
-    let upright = pose(zero, from_degrees([90.0, 0.0, 0.0]));
-    let still = Pose::IDENTITY;
-    let hull = |points: &[[f64; 3]]| {
-        let shape = SharedShape::convex_hull(&points.iter().map(|p| V::new(p[0], p[1], p[2])).collect::<Vec<_>>());
-        shape.filter(|shape| shape.mass_properties(1.0).mass() > 0.0)
-    };
-    let flat = |key: &str| (key.to_string(), "the points lie in a plane or too close together, expected a body with a volume".to_string());
-    Ok(match words {
-        BodyShape::Sphere { radius } => (SharedShape::ball(*radius), still, surface::sphere(3, zero, *radius)),
-        BodyShape::Box { size: [x, y, z] } => {
-            let half = Vector { x: 0.5 * x, y: 0.5 * y, z: 0.5 * z };
-            (SharedShape::cuboid(half.x, half.y, half.z), still, surface::cuboid(zero, half, from_degrees([0.0; 3])))
-        }
-        BodyShape::Capsule { radius, length } => {
-            let tip = Vector { x: 0.0, y: 0.0, z: 0.5 * length };
-            (SharedShape::capsule_z(0.5 * length, *radius), still, surface::capsule(-tip, tip, *radius))
-        }
-        BodyShape::Cylinder { radius, height } => {
-            let profile = [[0.0, -0.5 * height], [*radius, -0.5 * height], [*radius, 0.5 * height], [0.0, 0.5 * height]];
-            (SharedShape::cylinder(0.5 * height, *radius), upright, surface::revolved(zero, &profile, SIDES))
-        }
-        BodyShape::Cone { radius, height } => {
-            let profile = [[0.0, -0.5 * height], [*radius, -0.5 * height], [0.0, 0.5 * height]];
-            (SharedShape::cone(0.5 * height, *radius), upright, surface::revolved(zero, &profile, SIDES))
-        }
-        BodyShape::Hull { points } => {
-            let shape = hull(points).ok_or_else(|| flat(".shape.hull.points"))?;
-            let mesh = drawn(&shape);
-            (shape, still, mesh)
-        }
-        BodyShape::Mesh(_) => {
-            let mesh = file.ok_or_else(|| (".shape.mesh".to_string(), "the mesh has not been loaded".to_string()))?;
-            (hull(&mesh.vertices).ok_or_else(|| flat(".shape.mesh"))?, still, mesh.clone())
-        }
-    })
-}
-
-/// The triangles of a convex hull.
-fn drawn(shape: &SharedShape) -> Mesh {
-    let Some(hull) = shape.as_convex_polyhedron() else { return Mesh::default() };
-    let (points, triangles) = hull.to_trimesh();
-    Mesh { vertices: points.iter().map(|p| [p.x, p.y, p.z]).collect(), triangles, ..Mesh::default() }
+impl Made {
+    /// The surface of its bodies with its hollows, which takes time to find, and by which part of the volume of a mesh that is too large, if it is.
+    pub fn hull(&self) -> (Hull, Option<f64>) {
+        let (shape, place, left) = self.form.surface();
+        (Hull { place: self.own * place, shape, ..self.outline.clone() }, left)
+    }
 }
 
 /// The surface of a body that masses touch: `back` and `turn` lead from the axes of its words to its own.
-fn touched(words: &BodyShape, shape: &SharedShape, mesh: &Mesh, back: impl Fn(Vector) -> Vector, turn: Quat<f64>) -> Option<Shape> {
+fn touched(words: &BodyShape, mesh: &Mesh, back: impl Fn(Vector) -> Vector, turn: Quat<f64>) -> Option<Shape> {
     let zero = Vector::default();
     Some(match words {
         BodyShape::Sphere { radius } => Shape::Sphere { center: back(zero), radius: *radius },
@@ -82,16 +44,16 @@ fn touched(words: &BodyShape, shape: &SharedShape, mesh: &Mesh, back: impl Fn(Ve
             Shape::Capsule { from: back(-tip), to: back(tip), radius: *radius }
         }
         _ => {
-            let hull = if let BodyShape::Mesh(_) = words { drawn(shape) } else { mesh.clone() };
-            let vertices = hull.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect();
-            Shape::Animated { facets: Facets::new(&[&Mesh { vertices, ..hull }], &[0.0])?, shell: false }
+            let vertices = mesh.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect();
+            Shape::Animated { facets: Facets::new(&[&Mesh { vertices, ..mesh.clone() }], &[0.0])?, shell: false }
         }
     })
 }
 
-/// Bodies of an object; `file` is the mesh of its shape, if that is one.
-pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
-    let (shape, place, mesh) = solid(&words.shape, file)?;
+/// Bodies of an object; `file` finds the meshes of its shape; `seed` is that of the scene.
+pub fn bodies(words: &Words, file: &dyn Fn(&MeshFile) -> Option<Mesh>, seed: u32) -> Result<Made, Wrong> {
+    let density = words.density.unwrap_or(1000.0);
+    let form = solid(".shape", &words.shape, file, density)?;
     let wrong = |key: &str, message: String| Err((key.to_string(), message));
     if words.density.is_some() && words.mass.is_some() {
         return wrong(".mass", "given beside density; leave out one of them".into());
@@ -99,9 +61,9 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
     if let Some(resting) = words.friction_static.filter(|resting| *resting < words.friction) {
         return wrong(".friction_static", format!("{resting}, expected >= {}, the friction of what slides", words.friction));
     }
-    let own = shape.mass_properties(1.0).transform_by(&place);
+    let own = form.weight;
     let volume = own.mass();
-    let mass = words.mass.unwrap_or_else(|| words.density.unwrap_or(1000.0) * volume);
+    let mass = words.mass.unwrap_or(density * volume);
     // Principal axes in those of the words.
     let frame = own.principal_inertia_local_frame;
     let axes = Quat { v: Vector { x: frame.x, y: frame.y, z: frame.z }, w: frame.w };
@@ -119,38 +81,50 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
         return wrong(".inertia", format!("[{a}, {b}, {c}] kg m²: no body has a moment larger than the sum of the others"));
     }
     let back = |p: Vector| axes.conj().turn(p - center);
-    let place = pose(back(Vector::default()), axes.conj()) * place;
-    let reach = place.translation.length() + shape.compute_local_bounding_sphere().radius();
+    let (shape, place) = form.outline();
+    let own = pose(back(Vector::default()), axes.conj());
+    let place = own * place;
+    let bound = shape.compute_local_bounding_sphere();
+    let reach = (place * bound.center()).length() + bound.radius();
     let friction = Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) };
-    let hull = Hull { shape, place, thickness: 0.0, friction, restitution: words.restitution, belt: Vector::default(), reach };
+    let outline = Hull {
+        shape,
+        place,
+        thickness: 0.0,
+        friction,
+        rolling: words.rolling_friction,
+        restitution: words.restitution,
+        belt: Vector::default(),
+        reach,
+    };
     // Extents of the first body as it stands.
     let stands = from_degrees(words.rotate.first().copied().unwrap_or_default());
     let extent = |axis: usize| {
-        let along = mesh.vertices.iter().map(|p| <[f64; 3]>::from(stands.turn(Vector::from(*p)))[axis]);
+        let along = form.drawn.vertices.iter().map(|p| <[f64; 3]>::from(stands.turn(Vector::from(*p)))[axis]);
         let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
         high - low
     };
-    let places = places(words, [extent(0), extent(2)])?;
+    let places = places(words, seed, [extent(0), extent(2)], center, axes, &outline)?;
     let n = places.len();
-    let each = |key: &str, list: &[[f64; 3]], i: usize| match list {
-        [] => Ok([0.0; 3]),
-        [one] => Ok(*one),
-        all if all.len() == n => Ok(all[i]),
-        all => Err((format!(".{key}"), format!("{} for {n} bodies, expected none, one, or {n}", all.len()))),
+    let fits = |key: &str, list: &[[f64; 3]]| match list.len() {
+        0 | 1 => Ok(()),
+        given if given == n => Ok(()),
+        given => Err((format!(".{key}"), format!("{given} for {n} bodies, expected none, one, or {n}"))),
     };
-    let body = |(i, x): (usize, &[f64; 3])| {
-        Ok(Body {
-            x: Vector::from(*x),
-            q: (from_degrees(each("rotate", &words.rotate, i)?) * axes).normalized(),
-            v: each("velocity", &words.velocity, i)?.into(),
-            w: each("angular_velocity", &words.angular_velocity, i)?.into(),
-            inverse_mass: 1.0 / mass,
-            inertia,
-            inverse_inertia: [0.0; 6],
-        })
+    fits("rotate", &words.rotate)?;
+    fits("velocity", &words.velocity)?;
+    fits("angular_velocity", &words.angular_velocity)?;
+    let body = |(i, place): (usize, &Place)| Body {
+        x: place.x,
+        q: (place.turn * axes).normalized(),
+        v: each(&words.velocity, i).into(),
+        w: each(&words.angular_velocity, i).into(),
+        inverse_mass: 1.0 / mass,
+        inertia,
+        inverse_inertia: [0.0; 6],
     };
-    let bodies = places.iter().enumerate().map(body).collect::<Result<Vec<_>, Wrong>>()?;
-    let Some(shape) = touched(&words.shape, &hull.shape, &mesh, back, axes.conj()) else {
+    let bodies = places.iter().enumerate().map(body).collect();
+    let Some(shape) = touched(&words.shape, &form.met, back, axes.conj()) else {
         return wrong(".shape", "its surface has no triangle with an area".into());
     };
     let solid = Collider {
@@ -166,25 +140,6 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
         rig: None,
         edges: None,
     };
-    let mesh = Mesh { vertices: mesh.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect(), ..mesh };
-    Ok(Made { hull, solid, mesh, bodies })
-}
-
-/// Where bodies of this width and height [m] stand.
-fn places(words: &Words, [width, height]: [f64; 2]) -> Result<Vec<[f64; 3]>, Wrong> {
-    let Some(arrange) = &words.arrange else { return Ok(words.position.clone()) };
-    let &[[x, y, z]] = &words.position[..] else {
-        return Err((".arrange".into(), format!("given with {} positions; give that of the first body alone", words.position.len())));
-    };
-    let at = |i: f64, step: [f64; 3]| [x + i * step[0], y + i * step[1], z + i * step[2]];
-    Ok(match arrange {
-        Arrange::Row { count, step } => (0..*count).map(|i| at(f64::from(i), *step)).collect(),
-        Arrange::Stack { count } => (0..*count).map(|i| at(f64::from(i), [0.0, 0.0, height])).collect(),
-        Arrange::Wall { columns, rows } => (0..*rows)
-            .flat_map(|row| {
-                let shift = 0.5 * f64::from(row % 2);
-                (0..*columns).map(move |column| [x + (f64::from(column) + shift) * width, y, z + f64::from(row) * height])
-            })
-            .collect(),
-    })
+    let mesh = Mesh { vertices: form.drawn.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect(), ..form.drawn.clone() };
+    Ok(Made { form, own, outline, solid, mesh, bodies })
 }

@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look, SOLID};
-use tumble_interface::scene::{Body, BodyShape, Integrator, Method, Scene, System as Plan};
+use tumble_interface::scene::{Body, Integrator, MeshFile, Method, Scene, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -23,10 +23,6 @@ use tumble_interface::{Issue, Mesh, Warning};
 const BODY: f64 = 12_000.0;
 
 pub struct Rules;
-
-fn count(thing: &Body) -> f64 {
-    thing.arrange.as_ref().map_or(thing.position.len() as f64, |arrange| arrange.count())
-}
 
 impl MethodRules for Rules {
     fn words(&self) -> &'static [Method] {
@@ -105,7 +101,7 @@ impl MethodRules for Rules {
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let own = scene.body.iter().filter(|t| is_in(&t.system, plan));
-        let look = |t: &Body| Look { few: count(t) < FEW, ..Look::new(&t.name, Form::Instances, colors.pick(t.color)) };
+        let look = |t: &Body| Look { few: t.count() < FEW, ..Look::new(&t.name, Form::Instances, colors.pick(t.color)) };
         let joints = scene.joint.iter().filter(|t| is_in(&t.system, plan));
         let held = |t: &tumble_interface::scene::Joint| Look { few: true, ..Look::new(&t.name, Form::Points, t.color.unwrap_or(SOLID)) };
         own.map(look).chain(joints.map(held)).collect()
@@ -114,21 +110,23 @@ impl MethodRules for Rules {
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
         let of = |words: &tumble_interface::scene::Joint| {
             let chain = scene.body.iter().find(|thing| words.chain && words.between.first() == Some(&thing.name));
-            chain.map_or(1.0, count)
+            chain.map_or(1.0, Body::count)
         };
-        BODY * (scene.body.iter().map(count).sum::<f64>() + scene.joint.iter().map(of).sum::<f64>())
+        BODY * (scene.body.iter().map(Body::count).sum::<f64>() + scene.joint.iter().map(of).sum::<f64>())
     }
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
         let (mut objects, mut bodies, mut solids) = (Vec::new(), Bodies::default(), Vec::new());
         for thing in scene.body.iter().filter(|t| is_in(&t.system, plan)) {
-            match recipes::bodies(thing, file_of(thing, builder.assets).as_ref()) {
+            match recipes::bodies(thing, &file_of(builder.assets), scene.seed) {
                 Ok(made) => {
                     let first = bodies.rows.len();
+                    let (hull, left) = made.hull();
+                    builder.warnings.extend(left.map(|left| coarse(thing, left)));
                     bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
-                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), made.hull.reach));
-                    bodies.hulls.push(made.hull);
+                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), hull.reach));
+                    bodies.hulls.push(hull);
                     bodies.rows.extend(made.bodies);
                     objects.push(Object { name: thing.name.clone(), rows: first..bodies.rows.len(), mesh: made.mesh });
                 }
@@ -164,18 +162,24 @@ impl MethodRules for Rules {
     }
 }
 
+/// Convex parts of a mesh are larger than it by this part, more than meant.
+fn coarse(thing: &Body, left: f64) -> Warning {
+    let message = format!("its convex parts fill {} % more than its mesh; raise most, or tolerance if that will do", short(100.0 * left));
+    Warning::new(Code::CoarseParts, format!("body \"{}\".shape", thing.name), message)
+}
+
 /// The row of a body in its system, how many its object has, and the body, unless there is none of that index or its words are wrong.
 pub fn body_of(scene: &Scene, assets: &Assets, name: &str, index: usize) -> Option<(u32, usize, Option<State>)> {
     let thing = scene.body.iter().find(|thing| thing.name == name)?;
     let before = scene.body.iter().take_while(|other| other.name != name).filter(|other| other.system == thing.system);
-    let first = before.map(count).sum::<f64>() as usize;
-    let made = recipes::bodies(thing, file_of(thing, assets).as_ref()).ok()?;
+    let first = before.map(Body::count).sum::<f64>() as usize;
+    let made = recipes::bodies(thing, &file_of(assets), scene.seed).ok()?;
     Some(((first + index) as u32, made.bodies.len(), made.bodies.get(index).copied()))
 }
 
 /// The surfaces of all bodies that masses touch, where they start.
 pub fn surfaces(scene: &Scene, assets: &Assets) -> Vec<Collider> {
-    let made = scene.body.iter().filter_map(|thing| recipes::bodies(thing, file_of(thing, assets).as_ref()).ok());
+    let made = scene.body.iter().filter_map(|thing| recipes::bodies(thing, &file_of(assets), scene.seed).ok());
     let zero = Vector::default();
     let placed = |solid: &Collider, body: &State| {
         let keys = vec![Key { time: 0.0, shift: body.x, turn: body.q }];
@@ -184,12 +188,9 @@ pub fn surfaces(scene: &Scene, assets: &Assets) -> Vec<Collider> {
     made.flat_map(|made| made.bodies.iter().map(|body| placed(&made.solid, body)).collect::<Vec<_>>()).collect()
 }
 
-/// The mesh of a body, if it has one.
-fn file_of(thing: &Body, assets: &Assets) -> Option<Mesh> {
-    match &thing.shape {
-        BodyShape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)),
-        _ => None,
-    }
+/// Finds the meshes of bodies.
+fn file_of(assets: &Assets) -> impl Fn(&MeshFile) -> Option<Mesh> {
+    |file| assets.get(&file.path).map(|mesh| recipes::placed(mesh, file))
 }
 
 /// The joints of a system.

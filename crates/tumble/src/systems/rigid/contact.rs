@@ -6,7 +6,7 @@ use crate::math::Quat;
 use crate::math::parallel::fold;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rotation, Vector as V};
-use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test};
 use parry3d_f64::shape::SharedShape;
 
 /// Surfaces this close count as touching, over the reach of a body.
@@ -15,7 +15,7 @@ const CLOSE: f64 = 1e-3;
 const NEAR: f64 = 0.1;
 
 /// Numbers of a contact in a snapshot.
-pub const CONTACT: usize = 17;
+pub const CONTACT: usize = 20;
 
 /// The surface of bodies.
 #[derive(Clone)]
@@ -28,12 +28,30 @@ pub struct Hull {
     pub thickness: f64,
     /// Coulomb friction.
     pub friction: Friction,
+    /// Largest moment against rolling, over the normal force and the height of the centre of mass over the contact.
+    pub rolling: f64,
     /// Speed after a bounce over speed before.
     pub restitution: f64,
     /// Velocity of the surface along itself [m/s], in the axes of the body.
     pub belt: Vector,
     /// Greatest distance of the surface from the centre of mass [m].
     pub reach: f64,
+}
+
+impl Hull {
+    /// Lower and upper corner about the centre of mass [m] of a body of this turn.
+    pub fn bounds(&self, q: Quat<f64>) -> [Vector; 2] {
+        let Aabb { mins, maxs } = self.shape.compute_aabb(&(pose(Vector::default(), q) * self.place));
+        [vector(mins), vector(maxs)]
+    }
+
+    /// Whether two bodies with it overlap or touch.
+    pub fn meets(&self, one: (Vector, Quat<f64>), other: (Vector, Quat<f64>)) -> bool {
+        let at = |(x, q)| pose(x, q) * self.place;
+        let near = || intersection_test(&at(one), &*self.shape.0, &at(other), &*self.shape.0);
+        // What cannot be told may meet.
+        (one.0 - other.0).norm() <= 2.0 * self.reach && near().map_or(true, |found| found.intersecting)
+    }
 }
 
 /// Bodies and their surfaces: first those that move, then solids.
@@ -74,6 +92,8 @@ pub struct Contact {
     pub gap: f64,
     /// Coulomb friction.
     pub friction: Friction,
+    /// Largest moment against rolling over the normal force [m].
+    pub rolling: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
     /// Velocity of the second surface along the first by belts [m/s].
@@ -82,12 +102,14 @@ pub struct Contact {
     pub press: f64,
     /// Impulse of friction on the second [N s].
     pub drag: Vector,
+    /// Angular impulse against rolling on the second [N m s].
+    pub roll: Vector,
 }
 
 impl Contact {
     /// What a snapshot keeps of a contact: all that the next sub-step, the ledger and what is published read.
     pub fn numbers(&self) -> [f64; CONTACT] {
-        let vectors = [self.local, self.drag, self.normal, self.arms[0], self.arms[1]].map(<[f64; 3]>::from);
+        let vectors = [self.local, self.drag, self.normal, self.arms[0], self.arms[1], self.roll].map(<[f64; 3]>::from);
         let mut numbers = [0.0; CONTACT];
         numbers[..2].copy_from_slice(&[self.press, self.gap]);
         numbers[2..].copy_from_slice(vectors.as_flattened());
@@ -104,10 +126,12 @@ impl Contact {
             arms: [at(11), at(14)],
             gap: numbers[1],
             friction: Friction::default(),
+            rolling: 0.0,
             restitution: 0.0,
             belt: Vector::default(),
             press: numbers[0],
             drag: at(5),
+            roll: at(17),
         }
     }
 }
@@ -166,17 +190,23 @@ fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
         for point in manifold.contacts().iter().filter(|point| point.dist <= within + skin) {
             let on = vector(part * point.local_p1);
             let at = on + normal * (0.5 * point.dist);
+            let arms = [at - a.x, at - b.x];
+            // What nothing moves does not roll.
+            let arm =
+                |hull: &Hull, body: &Body, arm: Vector| if body.inverse_mass > 0.0 { hull.rolling * arm.dot(normal).abs() } else { 0.0 };
             out.push(Contact {
                 pair,
                 local: a.q.conj().turn(on - a.x),
                 normal,
-                arms: [at - a.x, at - b.x],
+                arms,
                 gap: point.dist - skin,
                 friction,
+                rolling: arm(one, a, arms[0]).max(arm(two, b, arms[1])),
                 restitution: one.restitution.max(two.restitution),
                 belt: belt - normal * belt.dot(normal),
                 press: 0.0,
                 drag: Vector::default(),
+                roll: Vector::default(),
             });
         }
     }
@@ -215,7 +245,7 @@ pub fn carry(bodies: &Bodies, old: &[Contact], new: &mut [Contact]) {
         let best = same.filter(|(distance, _)| *distance < near * near).min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, o)) = best {
             contact.press = o.press;
-            contact.drag = o.drag - contact.normal * o.drag.dot(contact.normal);
+            [contact.drag, contact.roll] = [o.drag, o.roll].map(|p| p - contact.normal * p.dot(contact.normal));
         }
     }
 }

@@ -336,7 +336,7 @@ impl System for Rigid {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     fn absorb(&mut self, exchange: &mut Turn<'_>) {

@@ -63,6 +63,7 @@ pub fn hulls(solid: &Collider) -> Vec<Hull> {
         place,
         thickness: solid.thickness,
         friction: solid.friction,
+        rolling: 0.0,
         restitution: solid.restitution,
         belt: solid.belt,
     };

@@ -2,6 +2,7 @@
 //! overlaps, too, and rigid ones after bodies have moved, which take away the speed of mending.
 //!
 //!   speed  u = v_b + ω_b × r_b - v_a - ω_a × r_a,   n·u ≥ -gap/h  ⊥  p ≥ 0,   |d| ≤ μ p,   d ∥ -u_t where it slides          (rigid.4)
+//!   and against rolling the angular impulse  |l| ≤ μ_r ρ p,   l ∥ -(ω_b - ω_a)_t where it rolls                              (rigid.6)
 //!
 //! Sources: sequential impulses and soft constraints [catto2009], small steps [macklin2019], the step along the slide back to the cone
 //! [jourdan1998].
@@ -23,29 +24,77 @@ const ROUNDS: usize = 200;
 /// Sweeps over the points of a pair that bounces, at most.
 const SWEEPS: usize = 100;
 
+/// Friction against sliding, or against rolling: impulses along two levers, both together at most in proportion to the impulse along the normal.
+#[derive(Clone)]
+struct Friction {
+    /// Two directions across the normal, or axes.
+    levers: [Lever; 2],
+    /// The inverse of K along them: xx, yy, xy [kg], or [kg m²].
+    inverse: [f64; 3],
+    /// 1 over the largest eigenvalue of K.
+    slide: f64,
+    /// Speeds of belts along them [m/s].
+    belt: [f64; 2],
+    /// The largest impulse over that along the normal, of what rests and of what moves [1], or [m].
+    bounds: [f64; 2],
+    /// Impulses along them [N s], or [N m s].
+    impulse: [f64; 2],
+}
+
+impl Friction {
+    /// Along two levers of bodies with the sum `inverse_mass` [1/kg], as it was at first.
+    fn new(levers: [Lever; 2], inverse_mass: f64, bounds: [f64; 2], impulse: [f64; 2]) -> Self {
+        let k = |i: usize, j: usize| levers[i].compliance(&levers[j], inverse_mass);
+        let [xx, yy, xy] = [k(0, 0), k(1, 1), k(0, 1)];
+        let det = xx * yy - xy * xy;
+        let slide = 2.0 / (xx + yy + ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt());
+        Self { levers, inverse: [yy / det, xx / det, -xy / det], slide, belt: [0.0; 2], bounds, impulse }
+    }
+
+    /// Within Coulomb's cone over an impulse along the normal [N s].
+    #[inline(always)]
+    fn rub(&mut self, press: f64, a: &mut Twist, b: &mut Twist) {
+        let [s, t] = &self.levers;
+        let (x, y) = (s.speed(a, b) + self.belt[0], t.speed(a, b) + self.belt[1]);
+        let ([xx, yy, xy], [p, q], [resting, sliding]) = (self.inverse, self.impulse, self.bounds);
+        let mut new = [p - (xx * x + xy * y), q - (xy * x + yy * y)];
+        let square = |[p, q]: [f64; 2]| p * p + q * q;
+        if square(new) > (resting * press) * (resting * press) {
+            // With the inverse of K, the impulse would not point against the slide: a step along that, and back to the cone.
+            new = [p - self.slide * x, q - self.slide * y];
+            let (most, length) = (sliding * press, square(new).sqrt());
+            if length > most {
+                new = new.map(|p| p * (most / length));
+            }
+        }
+        s.push(a, b, new[0] - p);
+        t.push(a, b, new[1] - q);
+        self.impulse = new;
+    }
+
+    /// Its impulse as a vector along those of its levers.
+    fn sum(&self, along: impl Fn(&Lever) -> Vector) -> Vector {
+        along(&self.levers[0]) * self.impulse[0] + along(&self.levers[1]) * self.impulse[1]
+    }
+}
+
 /// A contact as the passes see it.
 #[derive(Clone)]
 struct Row {
     pair: [u32; 2],
-    /// The normal, and two directions across it.
-    levers: [Lever; 3],
+    /// The normal.
+    normal: Lever,
     /// 1/(n K n) [kg].
     mass: f64,
-    /// The inverse of K across the normal: xx, yy, xy [kg].
-    inverse: [f64; 3],
-    /// 1 over its largest eigenvalue [kg].
-    slide: f64,
-    /// Speed of belts across the normal [m/s].
-    belt: [f64; 2],
-    /// Coulomb's coefficients, of what rests and of what slides.
-    friction: [f64; 2],
+    /// Against sliding, and against rolling, if there is some.
+    friction: Friction,
+    rolling: Option<Box<Friction>>,
     /// Speed of approach that is left by a soft pass, negative to part what overlaps, and by a rigid pass [m/s].
     bias: [f64; 2],
     /// Factors of a soft pass on the effective mass and on the accumulated impulse.
     soft: [f64; 2],
-    /// Impulses along the three directions [N s].
+    /// Impulse along the normal [N s].
     press: f64,
-    drag: [f64; 2],
 }
 
 impl Row {
@@ -54,10 +103,14 @@ impl Row {
         let n = c.normal;
         let least = if n.x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
         let t = n.cross(Vector::from(least)).normalized();
-        let levers = [n, t, n.cross(t)].map(|along| Lever::new(pair, c.arms, along));
-        let k = |i: usize, j: usize| levers[i].compliance(&levers[j], a.inverse_mass + b.inverse_mass);
-        let [xx, yy, xy] = [k(1, 1), k(2, 2), k(1, 2)];
-        let det = xx * yy - xy * xy;
+        let across = [t, n.cross(t)];
+        let inverse_mass = a.inverse_mass + b.inverse_mass;
+        let normal = Lever::new(pair, c.arms, n);
+        let along = across.map(|along| Lever::new(pair, c.arms, along));
+        let bounds = [c.friction.resting, c.friction.sliding];
+        let belt = across.map(|along| c.belt.dot(along));
+        let friction = Friction { belt, ..Friction::new(along, inverse_mass, bounds, across.map(|along| c.drag.dot(along))) };
+        let rolls = || Friction::new(across.map(|axis| Lever::about(pair, axis)), 0.0, [c.rolling; 2], across.map(|axis| c.roll.dot(axis)));
         let fixed = a.inverse_mass == 0.0 || b.inverse_mass == 0.0;
         // h ω of the springs.
         let rate = std::f64::consts::TAU * MEND * if fixed { 2.0 } else { 1.0 };
@@ -70,16 +123,13 @@ impl Row {
         };
         Self {
             pair: c.pair,
-            levers,
-            mass: 1.0 / k(0, 0),
-            inverse: [yy / det, xx / det, -xy / det],
-            slide: 2.0 / (xx + yy + ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt()),
-            belt: [c.belt.dot(levers[1].along), c.belt.dot(levers[2].along)],
-            friction: [c.friction.resting, c.friction.sliding],
+            mass: 1.0 / normal.compliance(&normal, inverse_mass),
+            normal,
+            friction,
+            rolling: (c.rolling > 0.0).then(|| Box::new(rolls())),
             bias: [bias, c.gap.max(0.0) / pace.h],
             soft,
             press: c.press,
-            drag: [c.drag.dot(levers[1].along), c.drag.dot(levers[2].along)],
         }
     }
 
@@ -88,29 +138,21 @@ impl Row {
         let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
         if a.inverse_mass > 0.0 && b.inverse_mass > 0.0 {
             let arms = meeting(pair, [a.x, b.x], c.arms);
-            self.levers = self.levers.map(|lever| Lever::new(pair, arms, lever.along));
+            self.normal = Lever::new(pair, arms, self.normal.along);
+            let levers = &mut self.friction.levers;
+            *levers = levers.map(|lever| Lever::new(pair, arms, lever.along));
+            if let Some(rolling) = &mut self.rolling {
+                rolling.levers = rolling.levers.map(|lever| Lever::about(pair, lever.arms[0]));
+            }
         }
     }
 
-    /// Friction within Coulomb's cone.
+    /// Friction against sliding.
     #[inline(always)]
     fn rub(&mut self, a: &mut Twist, b: &mut Twist) {
-        let [_, s, t] = &self.levers;
-        let (x, y) = (s.speed(a, b) + self.belt[0], t.speed(a, b) + self.belt[1]);
-        let ([xx, yy, xy], [p, q], [resting, sliding]) = (self.inverse, self.drag, self.friction);
-        let mut new = [p - (xx * x + xy * y), q - (xy * x + yy * y)];
-        let square = |[p, q]: [f64; 2]| p * p + q * q;
-        if square(new) > (resting * self.press) * (resting * self.press) {
-            // With the inverse of K, the impulse would not point against the slide: a step along that, and back to the cone.
-            new = [p - self.slide * x, q - self.slide * y];
-            let (most, length) = (sliding * self.press, square(new).sqrt());
-            if length > most {
-                new = new.map(|p| p * (most / length));
-            }
+        if self.friction.bounds[0] > 0.0 {
+            self.friction.rub(self.press, a, b);
         }
-        s.push(a, b, new[0] - p);
-        t.push(a, b, new[1] - q);
-        self.drag = new;
     }
 
     /// One pass over a contact.
@@ -118,12 +160,13 @@ impl Row {
     fn pass(&mut self, twists: &mut [Twist], soft: bool) {
         let (a, b) = two(twists, self.pair);
         let (bias, [mass, left]) = if soft { (self.bias[0], self.soft) } else { (self.bias[1], [1.0, 0.0]) };
-        let speed = self.levers[0].speed(a, b);
+        let speed = self.normal.speed(a, b);
         let press = (self.press - self.mass * mass * (speed + bias) - left * self.press).max(0.0);
-        self.levers[0].push(a, b, press - self.press);
+        self.normal.push(a, b, press - self.press);
         self.press = press;
-        if self.friction[0] > 0.0 {
-            self.rub(a, b);
+        self.rub(a, b);
+        if let Some(rolling) = &mut self.rolling {
+            rolling.rub(press, a, b);
         }
     }
 }
@@ -168,7 +211,8 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
     let Some(t) = closing.iter().map(|(_, t)| *t).min_by(f64::total_cmp) else { return false };
     let met = closing.iter().map(|(c, _)| {
         let arms = meeting([a, b], [a.x + a.v * t, b.x + b.v * t], c.arms);
-        Row { press: 0.0, drag: [0.0; 2], ..Row::new(bodies, &Contact { arms, ..(*c).clone() }, pace) }
+        let none = Vector::default();
+        Row::new(bodies, &Contact { arms, press: 0.0, drag: none, roll: none, ..(*c).clone() }, pace)
     });
     let mut rows: Vec<Row> = met.collect();
     let [mut one, mut two] = [Twist::of(a), Twist::of(b)];
@@ -177,7 +221,7 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
         .iter()
         .zip(&closing)
         .map(|(row, (c, _))| {
-            let (speed, late) = (row.levers[0].speed(&one, &two), if first { pace.h - t } else { 0.0 });
+            let (speed, late) = (row.normal.speed(&one, &two), if first { pace.h - t } else { 0.0 });
             let rate = pull(b, c.normal) - pull(a, c.normal);
             speed - (1.0 + c.restitution) * (speed - rate * late).min(0.0)
         })
@@ -185,14 +229,12 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
     for _ in 0..SWEEPS {
         let mut change = 0.0_f64;
         for (row, after) in rows.iter_mut().zip(&after) {
-            let lever = &row.levers[0];
+            let lever = &row.normal;
             let press = (row.press + row.mass * (after - lever.speed(&one, &two))).max(0.0);
             change = change.max((press - row.press).abs() / press.max(f64::MIN_POSITIVE));
             lever.push(&mut one, &mut two, press - row.press);
             row.press = press;
-            if row.friction[0] > 0.0 {
-                row.rub(&mut one, &mut two);
-            }
+            row.rub(&mut one, &mut two);
         }
         if change < 1e-13 {
             break;
@@ -225,7 +267,10 @@ pub fn solve(
     let mut twists = now(bodies);
     for row in &rows {
         let (a, b) = two(&mut twists, row.pair);
-        row.levers.iter().zip([row.press, row.drag[0], row.drag[1]]).for_each(|(lever, impulse)| lever.push(a, b, impulse));
+        row.normal.push(a, b, row.press);
+        for friction in std::iter::once(&row.friction).chain(row.rolling.as_deref()) {
+            friction.levers.iter().zip(friction.impulse).for_each(|(lever, impulse)| lever.push(a, b, impulse));
+        }
     }
     let passes = |joints: &mut Rows, rows: &mut [Row], twists: &mut [Twist], soft: bool| {
         for _ in 0..pace.iterations {
@@ -255,6 +300,7 @@ pub fn solve(
 fn keep(contacts: &mut [Contact], rows: &[Row]) {
     for (c, row) in contacts.iter_mut().zip(rows) {
         c.press = row.press;
-        c.drag = row.levers[1].along * row.drag[0] + row.levers[2].along * row.drag[1];
+        c.drag = row.friction.sum(|lever| lever.along);
+        c.roll = row.rolling.as_ref().map_or(Vector::default(), |rolling| rolling.sum(|lever| lever.arms[0]));
     }
 }
