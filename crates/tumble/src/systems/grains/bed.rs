@@ -5,8 +5,30 @@ use super::list::{Four, Kept, List, Part, point};
 use super::press::Rows;
 use super::walls::{Touched, Walls, add};
 use crate::geometry::Vector;
-use crate::math::parallel::{CHUNK, Tasks, chunks2, fold};
+use crate::math::parallel::{CHUNK, Tasks, fold};
 use crate::math::{Real, Row};
+
+/// Numbers of a grain in [`Bed::quick`].
+pub const QUICK: usize = 4;
+
+/// A change of velocities.
+#[derive(Debug, Clone, Copy)]
+pub struct Kick {
+    /// For so long [s], within a step of so long [s].
+    pub h: f64,
+    pub step: f64,
+    /// Whether it is the first of an interval, before which no forces are known.
+    pub first: bool,
+}
+
+impl Kick {
+    /// What a velocity gains in half a step by the mean of the last two accelerations, given that of the last [m/s²]; `last` is half of what the one
+    /// before gave, and becomes half of what this one gives.                                                         (grains.8)
+    pub fn gain(&self, acceleration: Vector, last: Vector) -> [Vector; 2] {
+        let half = acceleration * (0.25 * self.step);
+        [half + if self.first { half } else { last }, half]
+    }
+}
 
 /// Grains in the order of their cells.
 #[derive(Debug, Default)]
@@ -22,8 +44,10 @@ pub struct Bed {
     /// Forces [N] and torques [N m] of contacts, by the last pass.
     pub force: Vec<Four>,
     pub torque: Vec<Four>,
-    /// Velocities and 1/mass, angular velocities and radii, in the engine's scalar.
-    pub quick: [Vec<Row>; 2],
+    /// Velocities and 1/mass, angular velocities and radii, and what both gain until the time of the next forces, in the engine's scalar, grain by
+    /// grain; and half of what the last forces gave both.
+    pub quick: Vec<Row>,
+    pub last: Vec<[Row; 2]>,
     /// The pair of each kind with each.
     pub pairs: Vec<Pair>,
     pub kinds: usize,
@@ -71,17 +95,19 @@ impl Bed {
     pub fn press(&mut self, walls: &mut Walls, t: f64, h: f64) {
         let mut parts = std::mem::take(&mut self.list.parts);
         let Self { x, v, w, force, torque, quick, pairs, kinds, .. } = self;
-        let [velocities, spins] = &mut *quick;
-        velocities.resize(x.len(), [0.0; 4]);
-        spins.resize(x.len(), [0.0; 4]);
-        chunks2(velocities, spins, |start, velocities, spins| {
+        quick.resize(QUICK * x.len(), [0.0; 4]);
+        quick.chunks_mut(QUICK * CHUNK).enumerate().in_parallel(|(c, quick)| {
+            let start = c * CHUNK;
             let rows = x[start..].iter().zip(&v[start..]).zip(&w[start..]);
-            for ((velocity, spin), ((x, v), w)) in velocities.iter_mut().zip(spins).zip(rows) {
-                *velocity = v.map(|c| c as Real);
-                *spin = [w[0] as Real, w[1] as Real, w[2] as Real, x[3] as Real];
+            for (quick, ((x, v), w)) in quick.chunks_exact_mut(QUICK).zip(rows) {
+                quick[0] = v.map(|c| c as Real);
+                quick[1] = [w[0] as Real, w[1] as Real, w[2] as Real, x[3] as Real];
+                if h == 0.0 {
+                    quick[2..].fill([0.0; 4]);
+                }
             }
         });
-        let rows = Rows { x, w, quick: [velocities, spins], pairs, kinds: *kinds, h };
+        let rows = Rows { x, w, quick, pairs, kinds: *kinds, h };
         let chunk = self.list.chunk;
         parts.iter_mut().zip(force.chunks_mut(chunk)).zip(torque.chunks_mut(chunk)).enumerate().in_parallel(
             |(c, ((part, force), torque))| {
@@ -89,19 +115,29 @@ impl Bed {
             },
         );
         self.list.parts = parts;
-        let Self { x, v, w, force, torque, .. } = self;
-        walls.press(Touched { x, v, w, force, torque, chunk }, t, h);
+        let Self { x, v, w, force, torque, quick, .. } = self;
+        walls.press(Touched { x, v, w, quick, force, torque, chunk }, t, h);
     }
 
-    /// Velocities change by forces and gravity over h [s].
-    pub fn kick(&mut self, gravity: Vector, h: f64) {
-        let Self { x, v, w, force, torque, .. } = self;
+    /// Velocities change by forces and gravity.
+    pub fn kick(&mut self, gravity: Vector, kick: Kick) {
+        let Self { x, v, w, force, torque, quick, last, .. } = self;
         let (x, force, torque) = (&*x, &*force, &*torque);
-        v.chunks_mut(CHUNK).zip(w.chunks_mut(CHUNK)).enumerate().in_parallel(|(c, (v, w))| {
-            for (k, (v, w)) in v.iter_mut().zip(w).enumerate() {
+        last.resize(x.len(), [[0.0; 4]; 2]);
+        let quick = quick.chunks_mut(QUICK * CHUNK).zip(last.chunks_mut(CHUNK));
+        v.chunks_mut(CHUNK).zip(w.chunks_mut(CHUNK)).zip(quick).enumerate().in_parallel(|(c, ((v, w), (quick, last)))| {
+            for (k, ((v, w), (quick, last))) in v.iter_mut().zip(w).zip(quick.chunks_exact_mut(QUICK).zip(last)).enumerate() {
                 let i = c * CHUNK + k;
-                add(v, gravity * h + point(&force[i]) * (v[3] * h));
-                add(w, point(&torque[i]) * (v[3] * h / (BALL * x[i][3] * x[i][3])));
+                let changes = [
+                    gravity + point(&force[i]) * v[3],
+                    point(&torque[i]) * (v[3] / (BALL * x[i][3] * x[i][3])),
+                ];
+                add(v, changes[0] * kick.h);
+                add(w, changes[1] * kick.h);
+                for k in 0..2 {
+                    let [gain, half] = kick.gain(changes[k], point(&last[k].map(f64::from)));
+                    (quick[2 + k], last[k]) = (narrow(gain), narrow(half));
+                }
             }
         });
     }
@@ -217,4 +253,9 @@ impl Bed {
         let column = [("position", &self.x), ("velocity", &self.v)].into_iter().find(|(_, rows)| !finite(&rows[row]));
         Some((row, column.map_or("angular_velocity", |(name, _)| name)))
     }
+}
+
+/// A vector in the engine's scalar.
+fn narrow(v: Vector) -> Row {
+    [v.x as Real, v.y as Real, v.z as Real, 0.0]
 }

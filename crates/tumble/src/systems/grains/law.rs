@@ -70,10 +70,12 @@ pub struct Overlap<L = f64> {
     pub depth: L,
     /// From the first to the second.
     pub normal: Vec3<L>,
-    /// Velocity of the second surface against the first at the point of contact [m/s].
+    /// Velocity of the second surface against the first at the point of contact [m/s], half a step before, and what it gains since.
     pub velocity: Vec3<L>,
-    /// Angular velocities of both [rad/s].
+    pub gain: Vec3<L>,
+    /// Angular velocities of both [rad/s] half a step before, and what that of the second against the first gains since.
     pub spins: [Vec3<L>; 2],
+    pub spin_gain: Vec3<L>,
     /// Radii [m]; infinite of what is flat.
     pub radii: [L; 2],
     /// R* [m], and the same of the distances of both centres from the point of contact.
@@ -194,9 +196,11 @@ impl<L: Lane> Pair<L> {
     pub fn answer(&self, at: &Overlap<L>, h: L, memory: &mut Memory<L>, turns: bool) -> Answer<L> {
         let n = at.normal;
         let (elastic, stiffness) = self.elastic(at.depth, at.radii, at.radius);
-        let away = at.velocity.dot(n);
+        let (away, gain) = (at.velocity.dot(n), at.gain.dot(n));
         let damping = self.damping * (stiffness * at.mass).sqrt();
-        let press = (elastic - damping * away).above_zero();
+        // The gain is by forces one and a half steps before; the contact's own have changed since.                  (grains.8)
+        let late = h * h.like(1.5) / at.mass * (stiffness * h * h.like(0.5) * away + damping * gain);
+        let press = (elastic - damping * (away + gain - late)).above_zero();
         let pull = self.cohesion * at.radius * h.like(std::f64::consts::TAU);
         let along = at.velocity - n * away;
         // Slip stays along the surface, and turns with the pair about its axis.
@@ -204,7 +208,7 @@ impl<L: Lane> Pair<L> {
         let mean = (at.spins[0].dot(n) + at.spins[1].dot(n)) * (h * h.like(0.5));
         let slip = slip + n.cross(slip) * mean + along * h;
         let shear = self.shear[0] * stiffness;
-        let drag = along * (damping * self.shear[1]);
+        let drag = (along + at.gain - n * gain) * (damping * self.shear[1]);
         let force = slip * shear + drag;
         // Cohesion presses surfaces together, too: friction follows the force without it. What slides goes on until sliding friction holds it.
         let [slides, rests] = self.friction;
@@ -230,14 +234,15 @@ impl<L: Lane> Pair<L> {
     fn resist(&self, at: &Overlap<L>, h: L, memory: &mut Memory<L>, shear: L, press: L) -> Vec3<L> {
         let (n, one) = (at.normal, h.like(1.0));
         let rate = at.spins[1] - at.spins[0];
+        let fast = rate + at.spin_gain;
         // The turn goes along with the pair.
         let mean = (at.spins[0] + at.spins[1]) * (h * h.like(0.5));
         let turn = memory.turn + mean.cross(memory.turn) + rate * h;
         let stiffness = shear * at.radius * at.radius;
         let drag = (shear * at.mass).sqrt() * at.radius * at.radius * h.like(2.0 * ROLLING);
         let levers = [at.lever, at.radius];
-        let twist = [n * turn.dot(n), n * rate.dot(n)];
-        let parts = [[turn - twist[0], rate - twist[1]], twist];
+        let twist = [n * turn.dot(n), n * fast.dot(n)];
+        let parts = [[turn - twist[0], fast - twist[1]], twist];
         let mut sum = n * h.zero();
         memory.turn = sum;
         for k in 0..2 {

@@ -19,7 +19,7 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::Real;
 use crate::system::{Archive, Part, System};
-use bed::Bed;
+use bed::{Bed, Kick};
 use law::{Dampings, Memory, Pair};
 use list::{Kept, List, point};
 use std::ops::Range;
@@ -190,9 +190,9 @@ impl Grains {
         }))
     }
 
-    fn kick(&mut self, t: f64, h: f64) {
-        self.bed.kick(Vector::from(self.settings.gravity.at(t)), h);
-        self.walls.kick(h);
+    fn kick(&mut self, t: f64, kick: Kick) {
+        self.bed.kick(Vector::from(self.settings.gravity.at(t)), kick);
+        self.walls.kick(kick);
     }
 
     /// The state of rows of some grains.
@@ -234,7 +234,7 @@ impl System for Grains {
         self.h = h;
         self.bed.sort(&mut self.walls, t);
         self.bed.press(&mut self.walls, t, 0.0);
-        self.kick(t, 0.5 * h);
+        self.kick(t, Kick { h: 0.5 * h, step: h, first: true });
         for k in 1..=n {
             if !go_on() {
                 return Ok(report);
@@ -243,7 +243,7 @@ impl System for Grains {
             self.walls.drift(h);
             self.bed.drift(&mut self.walls, time - h, h);
             self.bed.press(&mut self.walls, time, h);
-            self.kick(time, if k < n { h } else { 0.5 * h });
+            self.kick(time, Kick { h: if k < n { h } else { 0.5 * h }, step: h, first: false });
             report.stepped(h);
         }
         self.walls.post(exchange);

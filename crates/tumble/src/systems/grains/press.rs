@@ -1,5 +1,6 @@
 //! The contact pass over pairs of grains: those that touch, side by side in registers.
 
+use super::bed::QUICK;
 use super::law::{Memory, NUMBERS, Overlap, Pair};
 use super::list::{Four, Pairs, Part};
 use crate::math::simd::{Kernel, Width, dispatch};
@@ -9,8 +10,8 @@ use crate::math::{Lane, Real, Row, Vec3};
 pub struct Rows<'a> {
     pub x: &'a [Four],
     pub w: &'a [Four],
-    /// Velocities and 1/mass, and angular velocities and radii, in the engine's scalar.
-    pub quick: [&'a [Row]; 2],
+    /// [`Bed::quick`](super::bed::Bed::quick).
+    pub quick: &'a [Row],
     /// The pair of each kind with each.
     pub pairs: &'a [Pair],
     pub kinds: usize,
@@ -124,6 +125,18 @@ impl Pass<'_> {
         found.count = count;
     }
 
+    /// The velocities of grains, and what they gain.
+    #[inline(always)]
+    fn velocities<W: Width>(&self, w: W, rows: &[u32; LANES]) -> [[W::L; 4]; QUICK] {
+        let mut index = [0; LANES];
+        for l in 0..LANES {
+            index[l] = QUICK as u32 * rows[l];
+        }
+        let quick = self.rows.quick;
+        // SAFETY: there are so many rows for each grain, and the rows of pairs have been looked up.
+        unsafe { [w.gather(quick, &index), w.gather(&quick[1..], &index), w.gather(&quick[2..], &index), w.gather(&quick[3..], &index)] }
+    }
+
     /// Computes the contacts from `at` on that fill a register, and adds their forces one after the other.
     #[inline(always)]
     fn answer<W: Width>(&mut self, w: W, found: &Found, at: usize, batch: &mut Batch) {
@@ -150,18 +163,11 @@ impl Pass<'_> {
         for c in 0..NUMBERS {
             laws[c] = w.load(&batch.laws[c]);
         }
-        // SAFETY: blocks have a row at every index, and the rows of pairs have been looked up.
-        let [way, slip, turn, first, second, first_spin, second_spin] = unsafe {
-            [
-                w.gather(&found.ways[at..at + W::N], &ALL),
-                w.gather(&batch.slips, &ALL),
-                w.gather(&batch.turns, &ALL),
-                w.gather(self.rows.quick[0], &batch.pairs[0]),
-                w.gather(self.rows.quick[0], &batch.pairs[1]),
-                w.gather(self.rows.quick[1], &batch.pairs[0]),
-                w.gather(self.rows.quick[1], &batch.pairs[1]),
-            ]
-        };
+        // SAFETY: blocks have a row at every index.
+        let [way, slip, turn] =
+            unsafe { [w.gather(&found.ways[at..at + W::N], &ALL), w.gather(&batch.slips, &ALL), w.gather(&batch.turns, &ALL)] };
+        let [first, first_spin, first_gain, first_turn] = self.velocities(w, &batch.pairs[0]);
+        let [second, second_spin, second_gain, second_turn] = self.velocities(w, &batch.pairs[1]);
         let (one, half, tiny) = (w.splat(1.0), w.splat(0.5), w.splat(Real::MIN_POSITIVE));
         let (excess, radii) = (way[3], [first_spin[3], second_spin[3]]);
         let way = three(way);
@@ -180,7 +186,9 @@ impl Pass<'_> {
             depth,
             normal,
             velocity: three(second) - three(first) - (spins[0] * arms[0] + spins[1] * arms[1]).cross(normal),
+            gain: three(second_gain) - three(first_gain) - (three(first_turn) * arms[0] + three(second_turn) * arms[1]).cross(normal),
             spins,
+            spin_gain: three(second_turn) - three(first_turn),
             radii,
             radius: radii[0] * radii[1] / reach,
             lever: arms[0] * arms[1] / (arms[0] + arms[1]),

@@ -1,9 +1,11 @@
 //! Contact of grains with solids, and with rigid bodies, which yield.
 
+use super::bed::{Kick, QUICK};
 use super::law::{Dampings, Material, Memory, Overlap, Pair};
 use super::list::{Four, point};
 use crate::exchange::{Exchange, Turn, Visit};
 use crate::geometry::{Collider, Friction, Search, Shape, Vector};
+use crate::math::Row;
 use crate::math::parallel::Tasks;
 use std::sync::Arc;
 use tumble_interface::scene::NormalLaw;
@@ -34,6 +36,16 @@ struct Push {
     normal: Vector,
 }
 
+/// A body that grains meet.
+#[derive(Debug)]
+struct Body {
+    visit: Visit,
+    shape: usize,
+    /// What velocity and spin gain until the time of the next forces, and half of what the last forces gave both.
+    gains: [Vector; 2],
+    last: [Vector; 2],
+}
+
 /// The walls of a chunk.
 #[derive(Debug, Default)]
 struct Part {
@@ -48,6 +60,8 @@ pub struct Touched<'a> {
     pub x: &'a [Four],
     pub v: &'a [Four],
     pub w: &'a [Four],
+    /// [`Bed::quick`](super::bed::Bed::quick).
+    pub quick: &'a [Row],
     pub force: &'a mut [Four],
     pub torque: &'a mut [Four],
     /// Rows of a chunk.
@@ -64,7 +78,7 @@ pub struct Walls {
     pairs: Vec<Pair>,
     /// The surfaces of bodies; the bodies, and the surface of each.
     shapes: Vec<Arc<Collider>>,
-    bodies: Vec<(Visit, usize)>,
+    bodies: Vec<Body>,
     parts: Vec<Part>,
     /// Material of each kind of grains.
     kinds: Vec<Material>,
@@ -119,7 +133,8 @@ impl Walls {
         self.bodies.clear();
         for (shape, surface) in surfaces.iter().enumerate() {
             let reach = surface.reach + surface.solid.thickness;
-            self.bodies.extend(surface.rows.iter().map(|at| (Visit::new(exchange, *at, reach), shape)));
+            let body = |at: &_| Body { visit: Visit::new(exchange, *at, reach), shape, gains: Default::default(), last: Default::default() };
+            self.bodies.extend(surface.rows.iter().map(body));
         }
     }
 
@@ -132,7 +147,7 @@ impl Walls {
     pub fn name(&self, surface: u32) -> Option<&str> {
         match self.solids.get(surface as usize) {
             Some(solid) => Some(&solid.name),
-            None => Some(&self.shapes[self.bodies.get(surface as usize - self.solids.len())?.1].name),
+            None => Some(&self.shapes[self.bodies.get(surface as usize - self.solids.len())?.shape].name),
         }
     }
 
@@ -140,7 +155,7 @@ impl Walls {
     pub fn fastest(&self, t: f64, h: f64, size: f64) -> f64 {
         let of = |solid: &Collider| solid.speed(t, h, size + solid.motion.as_ref().map_or(0.0, |motion| motion.pivot.norm()));
         let solids = self.solids.iter().filter(|solid| solid.moves()).map(of);
-        solids.chain(self.bodies.iter().map(|(visit, _)| visit.fastest())).fold(0.0, f64::max)
+        solids.chain(self.bodies.iter().map(|body| body.visit.fastest())).fold(0.0, f64::max)
     }
 
     /// Calls `f` with the distance [m] of a point from each side of a surface that is nearer than `within` [m], and the direction away from it; see
@@ -153,7 +168,7 @@ impl Walls {
         if let Some(solid) = self.solids.get(surface) {
             return solid.each_near(p, t, search(solid), f);
         }
-        let (visit, shape) = &self.bodies[surface - self.solids.len()];
+        let Body { visit, shape, .. } = &self.bodies[surface - self.solids.len()];
         let state = &visit.state;
         let local = state.orientation.conj().turn(p - state.position);
         let shape = &self.shapes[*shape];
@@ -165,15 +180,23 @@ impl Walls {
         match self.solids.get(surface) {
             Some(solid) if solid.moves() => solid.surface(p, t, f64::INFINITY).2,
             Some(_) => Vector::default(),
-            None => self.bodies[surface - self.solids.len()].0.state.velocity_at(p),
+            None => self.bodies[surface - self.solids.len()].visit.state.velocity_at(p),
         }
+    }
+
+    /// What the velocity of a surface at a point, and its spin, gain until the time of the forces; those of solids are of that time.
+    fn gains(&self, surface: usize, p: Vector) -> [Vector; 2] {
+        let Some(Body { visit, gains: [velocity, spin], .. }) = surface.checked_sub(self.solids.len()).map(|k| &self.bodies[k]) else {
+            return Default::default();
+        };
+        [*velocity + spin.cross(p - visit.state.position), *spin]
     }
 
     /// Angular velocity of a surface [rad/s].
     fn spin(&self, surface: usize, t: f64) -> Vector {
         match self.solids.get(surface) {
             Some(solid) => solid.spin(t),
-            None => self.bodies[surface - self.solids.len()].0.state.spin,
+            None => self.bodies[surface - self.solids.len()].visit.state.spin,
         }
     }
 
@@ -190,7 +213,7 @@ impl Walls {
             for row in rows.clone() {
                 let (p, radius) = (point(&x[row]), x[row][3]);
                 for surface in 0..surfaces {
-                    let body = surface.checked_sub(walls.solids.len()).map(|k| &walls.bodies[k].0);
+                    let body = surface.checked_sub(walls.solids.len()).map(|k| &walls.bodies[k].visit);
                     let reach = radius + slack;
                     if body.is_some_and(|visit| (p - visit.state.position).norm() > visit.reach + reach) {
                         continue;
@@ -212,7 +235,7 @@ impl Walls {
     /// The contact pass: adds what surfaces do to grains.
     pub fn press(&mut self, rows: Touched<'_>, t: f64, h: f64) {
         let mut parts = std::mem::take(&mut self.parts);
-        let (walls, Touched { x, v, w, force, torque, chunk: each }) = (&*self, rows);
+        let (walls, Touched { x, v, w, quick, force, torque, chunk: each }) = (&*self, rows);
         parts.iter_mut().zip(force.chunks_mut(each)).zip(torque.chunks_mut(each)).enumerate().in_parallel(
             |(c, ((part, force), torque))| {
                 let before = std::mem::take(&mut part.contacts);
@@ -240,12 +263,16 @@ impl Walls {
                         let (arm, spin) = (-normal * (radius - depth), point(&w[i]));
                         let place = p + arm;
                         let body = s.checked_sub(walls.solids.len()).map(|k| (k, &walls.bodies[k]));
-                        let yields = body.map_or(0.0, |(_, (visit, _))| visit.yields_to(place, normal, normal).dot(normal).max(0.0));
+                        let yields = body.map_or(0.0, |(_, body)| body.visit.yields_to(place, normal, normal).dot(normal).max(0.0));
+                        let [gain, turn] = [2, 3].map(|c| point(&quick[QUICK * i + c].map(f64::from)));
+                        let gains = walls.gains(s, place);
                         let at = Overlap {
                             depth,
                             normal: -normal,
                             velocity: walls.velocity(s, place, t) - point(&v[i]) - spin.cross(arm),
+                            gain: gains[0] - gain - turn.cross(arm),
                             spins: [spin, walls.spin(s, t)],
+                            spin_gain: gains[1] - turn,
                             radii: [radius, f64::INFINITY],
                             radius,
                             lever: radius - depth,
@@ -271,7 +298,7 @@ impl Walls {
     /// The pair of a surface and a kind of grains; none of a surface that there is not.
     fn pair(&self, surface: usize, kind: usize, t: f64) -> Option<Pair> {
         let solid = self.solids.get(surface);
-        let place = if solid.is_some() { surface } else { self.solids.len() + self.bodies.get(surface - self.solids.len())?.1 };
+        let place = if solid.is_some() { surface } else { self.solids.len() + self.bodies.get(surface - self.solids.len())?.shape };
         let pair = *self.pairs.get(place * self.kinds.len() + kind)?;
         Some(match solid {
             Some(solid) if solid.rubbing.is_some() => pair.with_friction(solid.friction_at(t)),
@@ -279,22 +306,30 @@ impl Walls {
         })
     }
 
-    /// Bodies have the forces of the last pass, and their own acceleration, for h [s].
-    pub fn kick(&mut self, h: f64) {
-        self.bodies.iter_mut().for_each(|(visit, _)| visit.accelerate(h));
+    /// Bodies have the forces of the last pass, and their own acceleration.
+    pub fn kick(&mut self, kick: Kick) {
+        let h = kick.h;
+        let before: Vec<[Vector; 2]> = self.bodies.iter().map(|body| [body.visit.state.velocity, body.visit.state.spin]).collect();
+        self.bodies.iter_mut().for_each(|body| body.visit.accelerate(h));
         for push in self.parts.iter().flat_map(|part| &part.pushes) {
-            self.bodies[push.body].0.take_couple(push.point, push.force * h, push.couple * h, push.normal);
+            self.bodies[push.body].visit.take_couple(push.point, push.force * h, push.couple * h, push.normal);
+        }
+        for (Body { visit, gains, last, .. }, before) in self.bodies.iter_mut().zip(before) {
+            let after = [visit.state.velocity, visit.state.spin];
+            for k in 0..2 {
+                [gains[k], last[k]] = kick.gain((after[k] - before[k]) * (1.0 / h), last[k]);
+            }
         }
     }
 
     /// Bodies move for h [s].
     pub fn drift(&mut self, h: f64) {
-        self.bodies.iter_mut().for_each(|(visit, _)| visit.advance(h));
+        self.bodies.iter_mut().for_each(|body| body.visit.advance(h));
     }
 
     /// Posts what bodies have got.
     pub fn post(&self, exchange: &mut Turn<'_>) {
-        self.bodies.iter().for_each(|(visit, _)| visit.post_timed(exchange));
+        self.bodies.iter().for_each(|body| body.visit.post_timed(exchange));
     }
 
     /// All contacts, by rows.
