@@ -12,11 +12,17 @@ use tumble_interface::scene::{Arrange, Body as Words, BodyShape};
 /// Flat sides around what is round, in pictures.
 const SIDES: u32 = 48;
 
-/// Bodies of an object: their surface, that which masses of other systems touch, that for pictures, and their states.
+/// Bodies of an object, in their principal axes about their centre of mass.
 pub struct Made {
+    /// Their surface where they touch each other.
     pub hull: Hull,
+    /// The same where other systems touch them.
     pub solid: Collider,
+    /// Their surface for pictures.
     pub mesh: Mesh,
+    /// Volume of each [m³].
+    pub volume: f64,
+    /// Their states at the start.
     pub bodies: Vec<Body>,
 }
 
@@ -167,7 +173,7 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
         edges: None,
     };
     let mesh = Mesh { vertices: mesh.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect(), ..mesh };
-    Ok(Made { hull, solid, mesh, bodies })
+    Ok(Made { hull, solid, mesh, volume, bodies })
 }
 
 /// Where bodies of this width and height [m] stand.
