@@ -60,7 +60,7 @@ def test_a_tank_has_the_same_bits_on_any_threads_and_restored(tmp_path: Path) ->
 def test_balls_without_walls_are_told_of() -> None:
     tank = {"name": "tank", "inside": True, "shape": {"box": {"center": [0, 0, 0], "size": [1, 1, 1]}}}
     told = World(TANK).warnings
-    assert any("no obstacle to balls" in warning["message"] for warning in told), told
+    assert any("no obstacle to bodies" in warning["message"] for warning in told), told
     assert not any("obstacle" in warning["message"] for warning in World(TANK | {"collider": [tank]}).warnings)
 
 
@@ -95,7 +95,7 @@ def test_no_ball_is_too_light(ratio: float) -> None:
     ("change", "place", "message"),
     [
         ({"bodies": ["ballz"]}, 'gas "water".bodies[0]', 'no object "ballz"; did you mean "balls"'),
-        ({"bodies": ["cloth"], "sheet": []}, 'gas "water".bodies[0]', "no object of [[particles]]"),
+        ({"bodies": ["cloth"], "sheet": []}, 'gas "water".bodies[0]', "no object of [[body]], nor of [[particles]]"),
         ({"bodies": ["water"]}, 'gas "water".bodies[0]', "a fluid moves masses of dynamics"),
         (
             {"box": {"size": [1, 1, 1], "resolution": 10}},
@@ -119,6 +119,21 @@ def test_what_a_gas_cannot_move_is_told(change: Tree, place: str, message: str) 
     with pytest.raises(SceneError) as caught:
         World(scene)
     assert place in str(caught.value) and message in str(caught.value)
+
+
+def test_rigid_bodies_in_a_gas_are_no_smaller_than_its_cells_and_come_after_it() -> None:
+    scene: Tree = {
+        "version": 1,
+        "gas": [{"name": "air", "box": {"size": [1, 1, 1], "resolution": 20}, "bodies": ["plate"]}],
+        "body": [{"name": "plate", "shape": {"box": {"size": [0.1, 0.1, 0.01]}}, "position": [[0, 0, 0]]}],
+    }
+    with pytest.raises(SceneError, match='body of "plate" has a radius of 0.0709.* m, expected >= 1.5 cells = 0.075 m'):
+        World(scene)
+    scene["body"][0]["shape"]["box"]["size"] = [0.3, 0.3, 0.01]
+    assert not any(warning["code"] == "unfelt" for warning in World(scene).warnings)
+    systems = [{"name": "solid", "method": "rigid"}, {"name": "wet", "method": "gas"}]
+    with pytest.raises(SceneError, match='put \\[\\[system\\]\\] "wet" first'):
+        World({**scene, "system": systems})
 
 
 def test_what_a_gas_moves_comes_after_it() -> None:

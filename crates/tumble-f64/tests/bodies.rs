@@ -1,4 +1,4 @@
-//! Balls that a fluid moves, in double precision: docs/theory/gas.md, "Balls that move".
+//! Balls that a fluid moves, in double precision: docs/theory/gas.md, "Moving bodies".
 
 extern crate tumble_f64 as tumble;
 

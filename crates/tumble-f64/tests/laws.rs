@@ -25,6 +25,7 @@ mod galaxy;
 mod gas;
 mod gravitation;
 mod heat;
+mod immersed;
 mod integrators_order;
 mod integrators_oscillator;
 mod neighbours;

@@ -56,8 +56,8 @@ pub struct Gas {
     /// Boundary condition at colliders, which block the part of the box that they cover.
     #[serde(default)]
     pub solids: Solid,
-    /// Objects of [[particles]] in a system of dynamics whose masses are balls of their radius (in 2D: disks, a metre thick) with two-way coupling to
-    /// the fluid.
+    /// Objects that the fluid moves, and that move it: [[body]], by force and torque of the pressure; [[particles]] in a system of dynamics, whose
+    /// masses are balls of their radius (in 2D: disks, a metre thick).
     #[serde(default)]
     pub bodies: Vec<String>,
     /// Objects immersed in the fluid: cloth and other surfaces, in 2D curves.

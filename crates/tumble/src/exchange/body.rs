@@ -39,8 +39,10 @@ pub struct BodyState {
     pub velocity: Vector,
     /// Angular velocity [rad/s].
     pub spin: Vector,
-    /// Acceleration by all that its own system does to it but contact [m/s²], where the body is detailed.
+    /// Acceleration by all that its own system does to it but contact and joints [m/s²], where the body is detailed.
     pub acceleration: Vector,
+    /// Whether a solid or the world holds it, by contact or joints, so that it does not fall; told of rigid bodies.
+    pub borne: bool,
     /// Away from the solid of its own system that it touches, where the body is detailed; zero if it touches none.
     pub normal: Vector,
     /// Where that solid bears it: the centre of the points of contact [m], and the mean square of their distances from it, as xx, yy, zz, xy, yz,
@@ -61,6 +63,7 @@ impl Default for BodyState {
             velocity: zero,
             spin: zero,
             acceleration: zero,
+            borne: false,
             normal: zero,
             footing: (zero, [0.0; 6]),
             inverse_mass: 0.0,

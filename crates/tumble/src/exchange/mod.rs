@@ -36,6 +36,8 @@ pub enum When {
     Steady,
     /// Like a steady one, with the displacement that it has given to the visitor's copy.                   (coupling.9)
     Timed,
+    /// Like a steady one, through the centre of mass wherever that goes, as of a field: its moment about the origin is not told.
+    Central,
 }
 
 /// Where an impulse goes, and when it acts.
@@ -83,7 +85,7 @@ impl Letter {
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
         let to = BodyRow { body: numbers[0] as usize, row: numbers[1] as usize };
         let wrench = Wrench { impulse: v(&numbers[4..]), moment: v(&numbers[7..]), ways: [v(&numbers[10..]), v(&numbers[13..])] };
-        let when = [When::Kick, When::Steady, When::Timed][(numbers[2] as usize).min(2)];
+        let when = [When::Kick, When::Steady, When::Timed, When::Central][(numbers[2] as usize).min(3)];
         Self { address: (to, when), wrench, from: SystemId(numbers[3] as usize) }
     }
 }
@@ -95,7 +97,7 @@ pub struct Push {
     pub row: usize,
     /// The impulse [N s].
     pub impulse: Vector,
-    /// Its moment about the origin [N m s].
+    /// Its moment about the origin [N m s]; of a central one, that about the centre of mass.
     pub moment: Vector,
     /// When it acts.
     pub when: When,
@@ -378,7 +380,12 @@ impl Turn<'_> {
         self.send((to, When::Steady), Wrench { impulse, moment, ..Wrench::default() });
     }
 
-    /// The same, with the time integrals of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted, from which
+    /// The same of a force through the centre of mass of the row, wherever that goes: that of a field.
+    pub fn post_central(&mut self, to: BodyRow, impulse: Vector) {
+        self.send((to, When::Central), Wrench { impulse, ..Wrench::default() });
+    }
+
+    /// The same as a sum, with the time integrals of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted, from which
     /// the body takes its displacement.                                                                      (coupling.9)
     pub fn post_timed(&mut self, to: BodyRow, impulse: Vector, moment: Vector, ways: [Vector; 2]) {
         self.send((to, When::Timed), Wrench { impulse, moment, ways });

@@ -75,9 +75,11 @@ impl Visit {
         velocity + spin.cross(point - self.state.position)
     }
 
-    /// Has its own acceleration for h [s].
+    /// Has its own acceleration for h [s], if nothing bears it.
     pub fn accelerate(&mut self, h: f64) {
-        self.state.velocity = self.state.velocity + self.state.acceleration * h;
+        if !self.state.borne {
+            self.state.velocity = self.state.velocity + self.state.acceleration * h;
+        }
     }
 
     /// Moves for h [s].

@@ -3,8 +3,8 @@
 //!
 //! A method owns its state and the order of the parts of its step; the parts take from here what does not depend on the method.
 
-mod balls;
 mod failure;
+mod immersed;
 pub mod projection;
 pub mod rows;
 mod sheets;
@@ -12,8 +12,8 @@ mod sides;
 mod solids;
 mod viscosity;
 
-pub use balls::Ball;
 pub use failure::Failure;
+pub use immersed::{Hull, Immersed};
 pub use projection::PressureProjection;
 pub use sheets::Sheet;
 pub use sides::{Beyond, hold};

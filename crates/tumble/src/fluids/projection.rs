@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::rows::{self, Face, runs};
 use super::sides::{Beyond, hold};
 use super::solids::Solids;
-use crate::linalg::poisson::{Excess, Fault, Info, Params, Solver, Target, Weight};
+use crate::linalg::poisson::{Directions, Excess, Fault, Info, Params, Solver, Target, Weight};
 use crate::math::parallel::chunks;
 use crate::math::{Column, Real};
 use crate::operators::each_row;
@@ -192,11 +192,11 @@ impl PressureProjection<'_> {
             Ok(varying)
         });
         let mut varying = varying.transpose().map_err(Failure::Pressure)?;
-        let mut take = |yielded: &dyn Fn(&[Real]) -> Vec<f64>, q: Option<&[Real]>, b: &mut Column| {
+        let mut take = |yielded: &dyn Fn(&[Real]) -> Vec<Directions>, q: Option<&[Real]>, b: &mut Column| {
             if let Some(q) = q {
                 subtract_gradient(u, q, open, light);
                 if let Some(solids) = &mut solids {
-                    solids.bodies.iter_mut().zip(yielded(q).chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
+                    solids.bodies.iter_mut().zip(yielded(q)).for_each(|(body, product)| body.yield_to(&product, mass));
                     solids.follow();
                     solids.close(u);
                 }

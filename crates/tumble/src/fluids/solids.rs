@@ -12,7 +12,7 @@
 //! Source: [ng2009]. Degenerate: bars of meshes thinner than that obstruct like thicker ones; a solid that leaves a periodic box does not come back on the other side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
-use super::balls::Ball;
+use super::immersed::Immersed;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
 use crate::geometry::{Collider, Shape, Vector};
@@ -31,6 +31,9 @@ const DEPTH: f64 = 2.5;
 const WALL: f64 = 2.0;
 /// How often images are read: those close to the surface read each other.
 const PASSES: usize = 4;
+/// Distance of a point from a surface [m], the direction away from it, and its velocity [m/s].
+type Near = (f64, Vector, Vector);
+
 /// No cell.
 const NONE: u32 = u32::MAX;
 
@@ -75,7 +78,7 @@ struct Found {
 pub struct Solids {
     colliders: Arc<Vec<Collider>>,
     /// Solids that the fluid moves, counted after the colliders.
-    pub bodies: Vec<Ball>,
+    pub bodies: Vec<Immersed>,
     stick: bool,
     grid: Grid,
     /// Sides of the box that are held.
@@ -145,7 +148,7 @@ fn share(d: [f64; 4]) -> f64 {
 
 impl Solids {
     /// These colliders and bodies in a box; fluid sticks to them or slips along them.
-    pub fn new(colliders: Arc<Vec<Collider>>, bodies: Vec<Ball>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
+    pub fn new(colliders: Arc<Vec<Collider>>, bodies: Vec<Immersed>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
         let len = grid.lattice().len();
         let held = std::array::from_fn(|a| [0, 1].map(|end| grid.flat == Some(a) || sides[a][end].is_held()));
         Self {
@@ -178,7 +181,7 @@ impl Solids {
 
     /// Names of the colliders, then those of what the bodies belong to.
     pub fn names(&self) -> impl Iterator<Item = &String> {
-        self.colliders.iter().map(|collider| &collider.name).chain(self.bodies.iter().map(|body| &body.name))
+        self.colliders.iter().map(|collider| &collider.name).chain(self.bodies.iter().map(Immersed::name))
     }
 
     /// Whether any of them moves.
@@ -206,17 +209,17 @@ impl Solids {
         x.into()
     }
 
-    /// The nearest surface of a collider, no wall of it thinner than a cell needs; balls and capsules are none.                              (gas.19)
-    fn thickened(&self, collider: &Collider, x: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
-        let (d, n, v) = collider.surface(x, t, within);
+    /// The nearest surface of a solid, no wall of it thinner than a cell needs; balls and capsules are none.                              (gas.19)
+    fn thickened(&self, shape: &Shape, x: Vector, within: f64, surface: impl Fn(Vector, f64) -> Near) -> Near {
+        let (d, n, v) = surface(x, within);
         let through: f64 = self.grid.axes().map(|a| <[f64; 3]>::from(n)[a].abs()).sum();
         let least = WALL * self.grid.dx * through;
-        let round = matches!(collider.shape, Shape::Sphere { .. } | Shape::Capsule { .. });
+        let round = matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. });
         if round || d.abs() > (DEPTH + 1.0) * self.grid.dx || least == 0.0 {
             return (d, n, v);
         }
         // As far behind the surface, the way back to the wall is what it lacks.
-        let behind = collider.surface(x - n * (d + least), t, least).0;
+        let behind = surface(x - n * (d + least), least).0;
         (d - 0.5 * behind.max(0.0), n, v)
     }
 
@@ -224,15 +227,15 @@ impl Solids {
     fn nearest(&self, x: Vector, t: f64, within: f64) -> (usize, f64, Vector, Vector) {
         let mut best = (0, f64::INFINITY, Vector::default(), Vector::default());
         for (i, collider) in self.colliders.iter().enumerate() {
-            let (d, n, v) = self.thickened(collider, x, t, within);
+            let (d, n, v) = self.thickened(&collider.shape, x, within, |x, within| collider.surface(x, t, within));
             if d < best.1 {
                 best = (i, d, n, v);
             }
         }
         for (i, body) in self.bodies.iter().enumerate() {
-            let (d, n) = body.near(x, &self.grid);
+            let (d, n, v) = self.thickened(&body.hull.solid.shape, x, within, |x, within| body.near(x, &self.grid, within));
             if d < best.1 {
-                best = (self.colliders.len() + i, d, n, body.state.velocity);
+                best = (self.colliders.len() + i, d, n, v);
             }
         }
         best
@@ -263,40 +266,52 @@ impl Solids {
 
     /// Lists the faces of each body.
     fn list_faces(&mut self) {
-        let first = self.colliders.len();
-        self.bodies.iter_mut().flat_map(|body| &mut body.faces).for_each(Vec::clear);
+        let (first, grid) = (self.colliders.len(), self.grid);
+        let mut bodies = std::mem::take(&mut self.bodies);
+        bodies.iter_mut().for_each(Immersed::leave);
         for cut in &self.cuts {
-            let Some(body) = (cut.solid as usize).checked_sub(first).and_then(|i| self.bodies.get_mut(i)) else { continue };
-            body.faces[cut.axis].extend(cut.pushes());
+            let Some(body) = (cut.solid as usize).checked_sub(first).and_then(|i| bodies.get_mut(i)) else { continue };
+            body.meet(cut.axis, self.face_point(cut.axis, cut.at), cut.pushes(), &grid);
         }
+        bodies.iter_mut().for_each(Immersed::sort);
+        self.bodies = bodies;
+    }
+
+    /// The centre of a face, by its number.
+    fn face_point(&self, axis: usize, number: u32) -> Vector {
+        self.point(Place::Face(axis), self.grid.lattice().place(number as usize))
     }
 
     /// Gives the faces of bodies their velocities.
     pub fn follow(&mut self) {
-        let first = self.colliders.len();
-        let bodies = &self.bodies;
-        let of =
-            |solid: u32| (solid as usize).checked_sub(first).and_then(|i| bodies.get(i)).map(|body| <[f64; 3]>::from(body.state.velocity));
-        for cut in &mut self.cuts {
-            of(cut.solid).iter().for_each(|v| cut.velocity = v[cut.axis] as Real);
+        let (first, grid) = (self.colliders.len(), self.grid);
+        let (mut cuts, mut closed, mut ghosts) =
+            (std::mem::take(&mut self.cuts), std::mem::take(&mut self.closed), std::mem::take(&mut self.ghosts));
+        let of = |solid: u32, axis: usize, at: u32| -> Option<[f64; 3]> {
+            let body = (solid as usize).checked_sub(first).and_then(|i| self.bodies.get(i))?;
+            Some(body.velocity_at(self.face_point(axis, at), &grid).into())
+        };
+        for cut in &mut cuts {
+            of(cut.solid, cut.axis, cut.at).iter().for_each(|v| cut.velocity = v[cut.axis] as Real);
         }
-        for (axis, closed) in self.closed.iter_mut().enumerate() {
-            closed.iter_mut().for_each(|face| of(face.solid).iter().for_each(|v| face.velocity = v[axis] as Real));
+        for (axis, closed) in closed.iter_mut().enumerate() {
+            closed.iter_mut().for_each(|face| of(face.solid, axis, face.at).iter().for_each(|v| face.velocity = v[axis] as Real));
         }
-        for ghost in &mut self.ghosts {
-            of(ghost.solid).iter().for_each(|v| ghost.velocity = v.map(|v| v as Real));
+        for ghost in &mut ghosts {
+            of(ghost.solid, ghost.axis, ghost.at).iter().for_each(|v| ghost.velocity = v.map(|v| v as Real));
         }
+        (self.cuts, self.closed, self.ghosts) = (cuts, closed, ghosts);
     }
 
     /// Contribution of bodies to the pressure matrix; `density` is that of the fluid [kg/m³].
     pub fn joints(&self, density: f64) -> Vec<Joint> {
         let mass = (0..self.grid.dimension()).fold(density, |m, _| m * self.grid.dx);
-        self.bodies.iter().flat_map(|body| body.joints(mass)).collect()
+        self.bodies.iter().map(|body| body.joint(mass)).collect()
     }
 
     /// The speed of the fastest body [m/s].
     pub fn fastest(&self) -> f64 {
-        self.bodies.iter().map(|body| body.state.velocity.norm()).fold(0.0, f64::max)
+        self.bodies.iter().map(|body| body.fastest(&self.grid)).fold(0.0, f64::max)
     }
 
     /// The largest component of the velocity of a solid across a face that it cuts [m/s].
@@ -474,11 +489,7 @@ impl Solids {
 
     fn face_found(&self, axis: usize, at: [usize; 3], open: u8, t: f64, found: &mut Found) {
         let (grid, number) = (self.grid, self.face(axis, at) as u32);
-        let cell = |number: usize| {
-            let n = number - grid.lattice().at(0, 0, 0);
-            let s = grid.lattice().stride;
-            [n % s[1], n % s[2] / s[1], n / s[2]]
-        };
+        let cell = |number: usize| grid.lattice().place(number);
         let cells = match beside(&grid, axis, at) {
             Face::Between(low, high) => [Some(low), Some(high)],
             Face::Lower(high) => [None, Some(high)],

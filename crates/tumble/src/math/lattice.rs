@@ -48,6 +48,12 @@ impl Lattice {
     pub fn at(&self, i: usize, j: usize, k: usize) -> usize {
         FRONT + i + self.stride[1] * (j + 1) + self.stride[2] * (k + 1)
     }
+
+    /// The inverse of [`Lattice::at`].
+    pub fn place(&self, number: usize) -> [usize; 3] {
+        let (n, [_, row, plane]) = (number - self.at(0, 0, 0), self.stride);
+        [n % row, n % plane / row, n / plane]
+    }
 }
 
 #[cfg(test)]
@@ -64,5 +70,6 @@ mod tests {
         // The upper face of a row's last cell is no number of the next row.
         assert!(l.at(5, 0, 0) < l.at(0, 1, 0));
         assert_eq!(l.at(0, 1, 1) % 16, 0);
+        assert_eq!(l.place(l.at(5, 3, 2)), [5, 3, 2]);
     }
 }

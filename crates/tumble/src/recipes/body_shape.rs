@@ -25,6 +25,8 @@ pub struct Solid {
     pub met: Mesh,
     /// Mass, centre and moments of inertia at the density 1 kg/m³, in a body of parts at densities relative to that of the body.
     pub weight: MassProperties,
+    /// Volume of its parts [m³].
+    pub volume: f64,
 }
 
 /// A part of a solid.
@@ -46,7 +48,8 @@ struct Hollow {
 impl Solid {
     fn convex(shape: SharedShape, place: Pose, drawn: Mesh) -> Self {
         let weight = shape.mass_properties(1.0).transform_by(&place);
-        Self { parts: vec![Part { place, shape, hollow: None }], met: drawn.clone(), drawn, weight }
+        let volume = weight.mass();
+        Self { parts: vec![Part { place, shape, hollow: None }], met: drawn.clone(), drawn, weight, volume }
     }
 
     /// The same elsewhere, as so many times as dense.
@@ -161,16 +164,19 @@ pub fn solid(key: &str, words: &BodyShape, file: &dyn Fn(&MeshFile) -> Option<Me
             let points: Vec<V> = mesh.vertices.iter().map(|p| V::from(*p)).collect();
             let weight = MassProperties::from_trimesh(1.0, &points, &mesh.triangles);
             let hollow = Some(Hollow { mesh: mesh.clone(), place: still, tolerance: *tolerance, most: *most });
-            Solid { parts: vec![Part { place, shape, hollow }], met: mesh.clone(), drawn: mesh, weight }
+            let volume = weight.mass();
+            Solid { parts: vec![Part { place, shape, hollow }], met: mesh.clone(), drawn: mesh, weight, volume }
         }
         BodyShape::Compound { parts } => {
-            let mut all = Solid { parts: Vec::new(), drawn: Mesh::default(), met: Mesh::default(), weight: MassProperties::default() };
+            let (drawn, met, weight) = (Mesh::default(), Mesh::default(), MassProperties::default());
+            let mut all = Solid { parts: Vec::new(), drawn, met, weight, volume: 0.0 };
             for (i, part) in parts.iter().enumerate() {
                 let own = part.density.unwrap_or(density);
                 let solid = solid(&format!("{key}.compound.parts[{i}].shape"), &part.shape, file, own)?;
                 let place = pose(Vector::from(part.position), from_degrees(part.rotate));
-                let Solid { parts, drawn, met, weight } = solid.placed(place, own / density);
+                let Solid { parts, drawn, met, weight, volume } = solid.placed(place, own / density);
                 all.parts.extend(parts);
+                all.volume += volume;
                 append(&mut all.drawn, &drawn);
                 append(&mut all.met, &met);
                 all.weight += weight;

@@ -40,7 +40,7 @@ pub use hair::hair;
 pub use joints::{joints, named};
 pub use net::net;
 pub use particles::{draw_cloud, particles};
-pub use rigid::bodies;
+pub use rigid::{Made, bodies};
 pub use rope::rope;
 pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;

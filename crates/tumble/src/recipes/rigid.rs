@@ -10,7 +10,7 @@ use parry3d_f64::math::Pose;
 use tumble_interface::Mesh;
 use tumble_interface::scene::{Body as Words, BodyShape, MeshFile};
 
-/// Bodies of an object.
+/// Bodies of an object, in their principal axes about their centre of mass.
 pub struct Made {
     form: Solid,
     /// From the axes of the words to those of a body.
@@ -21,11 +21,16 @@ pub struct Made {
     pub solid: Collider,
     /// That for pictures.
     pub mesh: Mesh,
-    /// Their states.
+    /// Their states at the start.
     pub bodies: Vec<Body>,
 }
 
 impl Made {
+    /// Volume of each [m³].
+    pub fn volume(&self) -> f64 {
+        self.form.volume
+    }
+
     /// The surface of its bodies with its hollows, which takes time to find, and by which part of the volume of a mesh that is too large, if it is.
     pub fn hull(&self) -> (Hull, Option<f64>) {
         let (shape, place, left) = self.form.surface();

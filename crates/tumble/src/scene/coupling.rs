@@ -1,7 +1,7 @@
 //! What joins systems: anchors between masses, and between a mass and a rigid body.
 
 use super::laws::Reader;
-use super::methods::{body_of, place};
+use super::methods::{bodies_of, place};
 use crate::elements::DrivenSpring;
 use crate::geometry::Vector;
 use crate::math::Signal;
@@ -88,11 +88,12 @@ fn link(scene: &Scene, assets: &Assets, anchor: &Anchor, parts: &[Parts], issues
         };
         let s = place(&scene.system, object.kind, object.system)?;
         if object.kind == "body" {
-            let (row, count, body) = body_of(scene, assets, name, index)?;
-            let Some(body) = body else {
-                wrong(format!("there is no body {index} in \"{name}\"; the last one is {}", count.saturating_sub(1)));
+            let (first, made) = bodies_of(scene, assets, name)?;
+            let Some(body) = made.bodies.get(index) else {
+                wrong(format!("there is no body {index} in \"{name}\"; the last one is {}", made.bodies.len().saturating_sub(1)));
                 return None;
             };
+            let row = (first + index) as u32;
             let at = anchor.at.map_or(body.x, Vector::from);
             let arm = at - body.x;
             let least = body.inertia.into_iter().fold(f64::INFINITY, f64::min);

@@ -25,7 +25,7 @@ mod tests;
 
 pub use cosine::Series;
 pub use faces::{Weight, byte};
-pub use joined::Joint;
+pub use joined::{DIRECTIONS, Directions, Joint, times};
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 
 use crate::math::parallel::{Tasks, chunks};

@@ -106,20 +106,28 @@ impl Pockets {
         out
     }
 
-    /// Floating components and the means over each of what has these entries, where they are not zero but for rounding.
-    pub fn means(&self, entries: &[(u32, Real)]) -> Vec<(usize, f64)> {
-        let mut sums: Vec<(usize, [f64; 2])> = Vec::new();
-        for (at, entry) in entries {
+    /// Floating components and the means over each of the rows that have these entries, where they are not zero but for rounding.
+    pub fn means<const N: usize>(&self, entries: &[(u32, [Real; N])]) -> Vec<(usize, [f64; N])> {
+        let mut sums: Vec<(usize, [[f64; 2]; N])> = Vec::new();
+        for (at, entries) in entries {
             let run = self.runs.partition_point(|run| run.at <= *at as usize);
             let Some(run) = run.checked_sub(1).map(|i| self.runs[i]).filter(|run| (*at as usize) < run.at + run.cells) else { continue };
-            let entry = f64::from(*entry);
-            match sums.iter_mut().find(|(component, _)| *component == run.component) {
-                Some((_, sum)) => *sum = [sum[0] + entry, sum[1] + entry.abs()],
-                None => sums.push((run.component, [entry, entry.abs()])),
+            if self.components[run.component].held {
+                continue;
+            }
+            let known = sums.iter().position(|(component, _)| *component == run.component).unwrap_or_else(|| {
+                sums.push((run.component, [[0.0; 2]; N]));
+                sums.len() - 1
+            });
+            for ([sum, size], entry) in sums[known].1.iter_mut().zip(entries.map(f64::from)) {
+                (*sum, *size) = (*sum + entry, *size + entry.abs());
             }
         }
-        sums.retain(|(component, [sum, size])| !self.components[*component].held && sum.abs() > 64.0 * f64::from(Real::EPSILON) * size);
-        sums.into_iter().map(|(component, [sum, _])| (component, sum / self.components[component].cells as f64)).collect()
+        let mean = |component: usize, [sum, size]: [f64; 2]| {
+            if sum.abs() > 64.0 * f64::from(Real::EPSILON) * size { sum / self.components[component].cells as f64 } else { 0.0 }
+        };
+        let means = sums.into_iter().map(|(component, sums)| (component, sums.map(|sums| mean(component, sums))));
+        means.filter(|(_, means)| means.iter().any(|mean| *mean != 0.0)).collect()
     }
 
     /// The numbers of the cells of a component.

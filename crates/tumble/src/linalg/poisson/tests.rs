@@ -244,12 +244,19 @@ fn joints_are_a_part_of_the_matrix_and_cost_few_iterations() {
             }
         });
         // Two things whose faces do not add up to nothing, a ball of two cells a radius and a hundredth of the density, and a heavier one.
-        let cells = |seed: u32| -> Vec<(u32, Real)> {
+        let cells = |seed: u32| -> Vec<(u32, [Real; DIRECTIONS])> {
             let random = Random::new(seed, "joint");
             let at = |i: u32| lattice.at(1 + (i as usize * 5) % 24, 1 + i as usize % 4, 1 + (i as usize * 7) % 22) as u32;
-            (0..60).map(|i| (at(i), (random.quick(i, 0) + 0.1) as Real)).collect()
+            // Two directions each; they are not independent, as for a body that touches something.
+            let entries = |i: u32| std::array::from_fn(|k| if k < 2 { (random.quick(i, k as u32) + 0.1) as Real } else { 0.0 });
+            (0..60).map(|i| (at(i), entries(i))).collect()
         };
-        let joints = [Joint::new(cells(1), 10.0), Joint::new(cells(2), 0.5)];
+        let response = |[a, b, c]: [f64; 3]| {
+            let mut w = [[0.0; DIRECTIONS]; DIRECTIONS];
+            (w[0][0], w[0][1], w[1][0], w[1][1]) = (a, b, b, c);
+            w
+        };
+        let joints = [Joint::new(cells(1), response([10.0, 2.0, 4.0])), Joint::new(cells(2), response([0.5, 0.0, 0.0]))];
         let params = |method| Params { method, target: Target::Relative(1e-5), iterations: 400, excess: Excess::Remove };
         for method in Method::ALL.into_iter().filter(|method| method.is_gradients()) {
             let mut q = vec![0.0; lattice.len()];
@@ -260,7 +267,7 @@ fn joints_are_a_part_of_the_matrix_and_cost_few_iterations() {
             // Many iterations forget in single precision which directions they have had.
             let most = before + (before / 2).max(10);
             assert!(info.converged && info.iterations <= most, "{method:?}: {before} {}", info.iterations);
-            // b - A q - sum of w j (j.q), cell by cell, and what no q can balance taken off.
+            // b - A q - sum of Jᵀ W J q, cell by cell, and what no q can balance taken off.
             solver.join(Vec::new());
             let mut left = vec![0.0; lattice.len()];
             solver.residual(&b, &q, &mut left);
@@ -268,14 +275,20 @@ fn joints_are_a_part_of_the_matrix_and_cost_few_iterations() {
             let mut alive = Vec::new();
             each(lattice, |_, at| alive.extend((0..3).any(|a| plain.w[a][at] > 0 || plain.w[a][at + lattice.stride[a]] > 0).then_some(at)));
             for joint in &joints {
-                let mut j = vec![0.0; lattice.len()];
-                joint.cells.iter().for_each(|(at, entry)| j[*at as usize] += f64::from(*entry));
-                if sides == CLOSED {
-                    let mean = alive.iter().map(|at| j[*at]).sum::<f64>() / alive.len() as f64;
-                    alive.iter().for_each(|at| j[*at] -= mean);
+                let rows = [0, 1].map(|k| {
+                    let mut j = vec![0.0; lattice.len()];
+                    joint.cells.iter().for_each(|(at, entries)| j[*at as usize] += f64::from(entries[k]));
+                    if sides == CLOSED {
+                        let mean = alive.iter().map(|at| j[*at]).sum::<f64>() / alive.len() as f64;
+                        alive.iter().for_each(|at| j[*at] -= mean);
+                    }
+                    j
+                });
+                let products = [0, 1].map(|k| alive.iter().map(|at| rows[k][*at] * q[*at]).sum::<f64>());
+                for (k, row) in rows.iter().enumerate() {
+                    let yields: f64 = (0..2).map(|l| joint.response[k][l] * products[l]).sum();
+                    alive.iter().for_each(|at| left[*at] -= yields * row[*at]);
                 }
-                let product: f64 = alive.iter().map(|at| j[*at] * q[*at]).sum();
-                alive.iter().for_each(|at| left[*at] -= joint.weight * product * j[*at]);
             }
             if sides == CLOSED {
                 let mean = alive.iter().map(|at| left[*at]).sum::<f64>() / alive.len() as f64;

@@ -9,7 +9,7 @@ mod rigid;
 mod tracers;
 mod vicsek;
 
-pub use rigid::{body_of, surfaces};
+pub use rigid::{bodies_of, surfaces};
 
 use super::Assets;
 use super::build::Builder;
@@ -204,7 +204,8 @@ pub fn resolve(mut scene: Scene) -> Scene {
         }
     }
     scene.system = systems;
-    let often = if touches(&scene) { (RATE / scene.time.fps).ceil().clamp(1.0, 1e5) as u32 } else { 1 };
+    let immersed = scene.gas.iter().any(|gas| moves_bodies(&scene, gas));
+    let often = if immersed || touches(&scene) { (RATE / scene.time.fps).ceil().clamp(1.0, 1e5) as u32 } else { 1 };
     scene.time.exchanges.get_or_insert(often);
     scene
 }
@@ -219,6 +220,11 @@ pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
     let dry = || !scene.particles.iter().any(|thing| thing.name == object.name && thing.fluid.is_some());
     mover == Some(Method::Grains) || mover == Some(Method::Dynamics) && dry()
+}
+
+/// Whether a fluid moves rigid bodies.
+pub fn moves_bodies(scene: &Scene, gas: &tumble_interface::scene::Gas) -> bool {
+    gas.bodies.iter().any(|name| scene.body.iter().any(|thing| thing.name == *name))
 }
 
 /// A system for each method that objects of the scene need.

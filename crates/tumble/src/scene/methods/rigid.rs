@@ -1,6 +1,6 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::{MethodRules, is_in, scheme_of_its_own, touches, visits_bodies};
+use super::{MethodRules, is_in, moves_bodies, scheme_of_its_own, touches, visits_bodies};
 use crate::exchange::BodySurface;
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};
@@ -82,12 +82,15 @@ impl MethodRules for Rules {
                     ends.iter().any(|end| end == name) && ends.iter().any(|end| scene.body.iter().any(|thing| thing.name == *end))
                 })
             };
-        let others =
-            scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name) && !visits_bodies(scene, o));
+        let moves = |name: &str| scene.gas.iter().any(|gas| gas.name == name && moves_bodies(scene, gas));
+        let others = scene
+            .objects()
+            .into_iter()
+            .filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name) && !visits_bodies(scene, o) && !moves(o.name));
         let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
             let message = format!(
-                "rigid bodies meet each other, colliders, grains, and masses of dynamics systems, but not yet what [[{other}]] consists of, nor does that meet them"
+                "rigid bodies meet each other, colliders, grains, and masses of dynamics systems, and a gas where its `bodies` name them, but not what [[{other}]] consists of, nor does that meet them"
             );
             warnings.push(Warning::new(Code::Unfelt, "body", message));
         }
@@ -168,13 +171,11 @@ fn coarse(thing: &Body, left: f64) -> Warning {
     Warning::new(Code::CoarseParts, format!("body \"{}\".shape", thing.name), message)
 }
 
-/// The row of a body in its system, how many its object has, and the body, unless there is none of that index or its words are wrong.
-pub fn body_of(scene: &Scene, assets: &Assets, name: &str, index: usize) -> Option<(u32, usize, Option<State>)> {
+/// The first row of an object's bodies in their system, and the bodies, unless there is no such object or its words are wrong.
+pub fn bodies_of(scene: &Scene, assets: &Assets, name: &str) -> Option<(usize, recipes::Made)> {
     let thing = scene.body.iter().find(|thing| thing.name == name)?;
     let before = scene.body.iter().take_while(|other| other.name != name).filter(|other| other.system == thing.system);
-    let first = before.map(Body::count).sum::<f64>() as usize;
-    let made = recipes::bodies(thing, &file_of(assets), scene.seed).ok()?;
-    Some(((first + index) as u32, made.bodies.len(), made.bodies.get(index).copied()))
+    Some((before.map(Body::count).sum::<f64>() as usize, recipes::bodies(thing, &file_of(assets), scene.seed).ok()?))
 }
 
 /// The surfaces of all bodies that masses touch, where they start.

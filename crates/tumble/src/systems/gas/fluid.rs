@@ -5,8 +5,8 @@ use super::fire::Flame;
 use super::settings::Settings;
 use crate::exchange::{Exchange, Turn};
 use crate::fluids::rows::{extreme, largest, sum, worse};
-use crate::fluids::{Ball, Beyond, Failure, PressureProjection, Sheet, Solids, Viscosity, hold, projection, spread};
-use crate::geometry::{Collider, Vector};
+use crate::fluids::{Beyond, Failure, Immersed, PressureProjection, Sheet, Solids, Viscosity, hold, projection, spread};
+use crate::geometry::Collider;
 use crate::linalg::poisson::Solver;
 use crate::math::{Real, Spare};
 use crate::operators::{advect, advect_vectors, each_row, transport};
@@ -71,10 +71,6 @@ impl Fluid {
         [smoke, temperature, fuel]: [Option<Field>; 3],
     ) -> Result<Self, Failure> {
         let grid = u.on_faces("velocity of a fluid")?;
-        let mut solids = solids;
-        // At the start bodies have the velocity that they are given.
-        let masses: Vec<f64> =
-            solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.state.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
         let smoke = smoke.map(|f| carried(f, sides, "density", 0.0));
@@ -108,8 +104,6 @@ impl Fluid {
         hold(&mut fluid.u, &fluid.settings.sides, 0.0);
         fluid.clear();
         fluid.projection(0.0, 1.0, &mut StepReport::default())?;
-        fluid.bodies().iter_mut().zip(masses).for_each(|(body, mass)| body.state.inverse_mass = mass);
-        fluid.join();
         fluid.pressure.data.fill(0.0);
         Ok(fluid)
     }
@@ -168,7 +162,7 @@ impl Fluid {
                 self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(carried));
             }
             let h = t - solids.time;
-            solids.bodies.iter_mut().for_each(|body| body.state.position = body.state.position + body.state.velocity * h);
+            solids.bodies.iter_mut().for_each(|body| body.advance(h));
             solids.place(t);
             self.renew()?;
         }
@@ -184,16 +178,13 @@ impl Fluid {
         Ok(())
     }
 
-    /// Puts the solids where they were at time t: position and velocity of each body.
+    /// Puts the solids where they were at time t: the numbers of each body.
     pub(super) fn put(&mut self, t: f64, bodies: &[f64]) -> Option<()> {
         let solids = self.solids.as_mut()?;
-        if bodies.len() != 6 * solids.bodies.len() {
+        if bodies.len() != Immersed::NUMBERS * solids.bodies.len() {
             return None;
         }
-        let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
-        for (body, s) in solids.bodies.iter_mut().zip(bodies.chunks_exact(6)) {
-            (body.state.position, body.state.velocity) = (v(&s[..3]), v(&s[3..]));
-        }
+        solids.bodies.iter_mut().zip(bodies.chunks_exact(Immersed::NUMBERS)).for_each(|(body, numbers)| body.put(numbers));
         solids.place(t);
         self.renew().ok()?;
         self.clear();
@@ -352,7 +343,7 @@ impl Fluid {
     }
 
     /// Solids that it moves.
-    pub(super) fn bodies(&mut self) -> &mut [Ball] {
+    pub(super) fn bodies(&mut self) -> &mut [Immersed] {
         self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
     }
 

@@ -1,9 +1,9 @@
 //! Output of a fluid: columns, ledger, snapshots, failures.
 
 use super::fluid::Fluid;
-use crate::fluids::Solids;
 use crate::fluids::projection::around;
 use crate::fluids::rows::{self, sum};
+use crate::fluids::{Immersed, Solids};
 use crate::linalg::poisson::Weight;
 use crate::math::Real;
 use crate::operators::{average, curl, divergence};
@@ -68,7 +68,7 @@ impl Fluid {
         vectors.parts.iter().map(|part| average(part, Place::Cell)).collect()
     }
 
-    /// The force of the last pressure on every solid [N], three numbers for a collider and for each ball of an object.
+    /// The force of the last pressure on every solid [N], three numbers for a collider and for each body of an object.
     pub fn forces_on(&self) -> Vec<(&str, Vec<f64>)> {
         let Some(solids) = &self.solids else { return Vec::new() };
         let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
@@ -223,7 +223,7 @@ impl Fluid {
             archive.push("burnt", Part::Numbers(flame.heat.to_vec()));
         }
         if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
-            let bodies = solids.bodies.iter().flat_map(|body| [body.state.position, body.state.velocity]).flat_map(<[f64; 3]>::from);
+            let bodies = solids.bodies.iter().flat_map(Immersed::numbers);
             archive.push("solids", Part::Numbers(std::iter::once(solids.time).chain(bodies).collect()));
         }
     }

@@ -85,6 +85,10 @@ impl System for Gas {
         &self.name
     }
 
+    fn version(&self) -> u32 {
+        2
+    }
+
     fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {

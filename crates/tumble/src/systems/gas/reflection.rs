@@ -8,7 +8,7 @@
 
 use super::fluid::{Fluid, copy};
 use crate::fluids::projection::subtract_gradient;
-use crate::fluids::{Beyond, Failure};
+use crate::fluids::{Beyond, Failure, Immersed};
 use crate::math::Real;
 use crate::operators::each_row;
 use crate::state::Vectors;
@@ -37,14 +37,14 @@ impl Fluid {
         self.diffusion(h)?;
         self.trade(h);
         let mut from = copy(&self.u, &mut self.solver.spare)?;
-        let bodies: Vec<_> = self.bodies().iter().map(|body| (body.state.velocity, body.impulse)).collect();
+        let bodies: Vec<_> = self.bodies().iter().map(Immersed::before).collect();
         self.accelerate(t + half, half)?;
         self.middle_friction(&from, t + half, h, report)?;
         self.projection(t + half, half, report)?;
         mix(&mut flow, -1.0, &self.u, 2.0);
         mix(&mut from, -1.0, &self.u, 2.0);
         std::mem::swap(&mut self.u, &mut from);
-        self.bodies().iter_mut().zip(bodies).for_each(|(body, before)| body.reflect(before));
+        self.bodies().iter_mut().zip(&bodies).for_each(|(body, before)| body.reflect(before));
         self.solids.iter_mut().for_each(|solids| solids.follow());
         self.advection_by(Some(&mut flow), t + half, half)?;
         from.parts.into_iter().chain(flow.parts).for_each(|part| self.solver.spare.keep(part));

@@ -128,10 +128,7 @@ impl Bed {
         v.chunks_mut(CHUNK).zip(w.chunks_mut(CHUNK)).zip(quick).enumerate().in_parallel(|(c, ((v, w), (quick, last)))| {
             for (k, ((v, w), (quick, last))) in v.iter_mut().zip(w).zip(quick.chunks_exact_mut(QUICK).zip(last)).enumerate() {
                 let i = c * CHUNK + k;
-                let changes = [
-                    gravity + point(&force[i]) * v[3],
-                    point(&torque[i]) * (v[3] / (BALL * x[i][3] * x[i][3])),
-                ];
+                let changes = [gravity + point(&force[i]) * v[3], point(&torque[i]) * (v[3] / (BALL * x[i][3] * x[i][3]))];
                 add(v, changes[0] * kick.h);
                 add(w, changes[1] * kick.h);
                 for k in 0..2 {

@@ -133,7 +133,8 @@ impl Walls {
         self.bodies.clear();
         for (shape, surface) in surfaces.iter().enumerate() {
             let reach = surface.reach + surface.solid.thickness;
-            let body = |at: &_| Body { visit: Visit::new(exchange, *at, reach), shape, gains: Default::default(), last: Default::default() };
+            let body =
+                |at: &_| Body { visit: Visit::new(exchange, *at, reach), shape, gains: Default::default(), last: Default::default() };
             self.bodies.extend(surface.rows.iter().map(body));
         }
     }

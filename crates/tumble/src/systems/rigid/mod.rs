@@ -163,7 +163,8 @@ impl Rigid {
             body.orient();
             let impulse = push.impulse * part;
             body.v = body.v + impulse * body.inverse_mass;
-            body.w = body.w + body.turned(push.moment * part - body.x.cross(impulse));
+            let about = if push.when == When::Central { Vector::default() } else { body.x.cross(impulse) };
+            body.w = body.w + body.turned(push.moment * part - about);
         }
     }
 
@@ -186,7 +187,17 @@ impl Rigid {
         }
     }
 
-    fn step(&mut self, t: f64, h: f64) {
+    /// What this part of constant forces through their centres changes of the velocity of bodies [m/s].
+    fn gains(&self, part: f64) -> Vec<Vector> {
+        let mut gains = vec![Vector::default(); self.bodies.moving];
+        for push in self.steady.iter().filter(|push| push.when == When::Central) {
+            gains[push.row] = gains[push.row] + push.impulse * (part * self.bodies.rows[push.row].inverse_mass);
+        }
+        gains
+    }
+
+    /// A sub-step of h seconds; constant forces through the centres of bodies have changed their velocities by `gains` for it.
+    fn step(&mut self, t: f64, h: f64, gains: &[Vector]) {
         self.place_solids(t, h);
         let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
         let moving = self.bodies.moving;
@@ -210,8 +221,8 @@ impl Rigid {
             let mut held = vec![false; rows.len()];
             joints.held().for_each(|i| held[i as usize] = true);
             contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| held[i as usize] = true);
-            for ((body, held), hangs) in rows[..moving].iter_mut().zip(held).zip(hangs) {
-                body.x = body.x + body.v * h - if held { Vector::default() } else { gravity * (0.5 * h * h) };
+            for (((body, held), hangs), gain) in rows[..moving].iter_mut().zip(held).zip(hangs).zip(gains) {
+                body.x = body.x + body.v * h - if held { Vector::default() } else { (gravity * h + *gain) * (0.5 * h) };
                 body.turn_freely(h);
                 body.orient();
                 body.v = body.v + if hangs { half } else { Vector::default() };
@@ -351,6 +362,7 @@ impl System for Rigid {
         let n = self.steps(dt);
         let h = dt / f64::from(n);
         self.shift(0.5 * (dt + h));
+        let gains = self.gains(1.0 / f64::from(n));
         for k in 0..n {
             if !go_on() {
                 return Ok(report);
@@ -358,7 +370,7 @@ impl System for Rigid {
             let steady = std::mem::take(&mut self.steady);
             self.push(&steady, 1.0 / f64::from(n));
             self.steady = steady;
-            self.step(t + f64::from(k) * h, h);
+            self.step(t + f64::from(k) * h, h, &gains);
             report.stepped(h);
         }
         self.steady.clear();
@@ -373,7 +385,6 @@ impl System for Rigid {
         for body in exchange.bodies() {
             body.time = t;
             for (state, i) in body.states.iter_mut().zip(body.rows.clone()) {
-                let falls = body.detailed && !borne[i];
                 let (normal, footing) = if body.detailed { bears[i] } else { Default::default() };
                 let row = &mut self.bodies.rows[i];
                 row.orient();
@@ -384,7 +395,8 @@ impl System for Rigid {
                     spin: row.w,
                     inverse_mass: row.inverse_mass,
                     inverse_inertia: row.inverse_inertia,
-                    acceleration: if falls { gravity } else { Vector::default() },
+                    acceleration: if body.detailed { gravity } else { Vector::default() },
+                    borne: body.detailed && borne[i],
                     normal,
                     footing,
                 };
