@@ -94,10 +94,11 @@ export const STILL = { reducedMotion: "reduce" } as const;
 export const ready = (page: Page) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
 
 /** Serious findings of axe-core. The page must have been opened with `bypassCSP`. */
-export async function serious(page: Page): Promise<string[]> {
+export async function serious(page: Page, only?: string[]): Promise<string[]> {
   await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
-  return page.evaluate(async () => {
-    const { violations } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
+  return page.evaluate(async (only) => {
+    const options = { resultTypes: ["violations"], ...(only ? { runOnly: only } : {}) };
+    const { violations } = await (window as any).axe.run(document, options);
     const bad = violations.filter((v: any) => ["serious", "critical"].includes(v.impact));
     return bad.map(
       (v: any) =>
@@ -106,7 +107,7 @@ export async function serious(page: Page): Promise<string[]> {
           .map((n: any) => `${n.target.join(" ")} ${n.any[0]?.message ?? ""}`)
           .join("; ")}`,
     );
-  });
+  }, only);
 }
 
 /** Waits until the scene page shows a frame at or after this one. */

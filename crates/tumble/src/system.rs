@@ -60,7 +60,7 @@ pub trait System: Send + Sync {
     /// Whether an explosion is no breakdown.
     fn tolerate_explosions(&mut self, _on: bool) {}
 
-    /// Forgets what it chose from a scene whose state it had before.
+    /// Drops cached choices (sub-step count, energy scale) after loading another scene's state.
     fn reconsider(&mut self) {}
 
     /// Largest stable steps from its stiffest modes now; `None` if it has none to tell, or if `go_on` says no.
