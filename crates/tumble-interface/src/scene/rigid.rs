@@ -58,8 +58,8 @@ pub struct Body {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction_static: Option<f64>,
-    /// Largest moment against rolling, over the normal force and the distance of the centre of mass from the plane of contact: a ball or a cylinder rests
-    /// on slopes up to that tangent. A steel ball on steel has 0.001, a ball on grass 0.05. Of two bodies that touch, the larger moment holds.
+    /// Largest moment against rolling, over the normal force and the height of the centre of mass over the contact. A ball or cylinder rests on slopes up
+    /// to that tangent; a steel ball on steel has 0.001, a ball on grass 0.05. Of two bodies that touch, the larger moment holds.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub rolling_friction: f64,

@@ -89,8 +89,8 @@ pub fn places(
 /// Places in a box, its centre and its edges [m], one after the other: the first of random ones where a body touches none before.
 fn scattered(words: &Words, seed: u32, count: u32, [center, size]: [Vector; 2], axes: Quat<f64>, hull: &Hull) -> Result<Vec<Place>, Wrong> {
     let random = Random::new(seed, &words.name);
-    // Those that may touch are in neighbouring cells.
-    let cell = |x: Vector| <[f64; 3]>::from(x - center).map(|p| (p / (2.0 * hull.reach)).floor() as i64);
+    // Those that may touch are in neighbouring cells; beyond what an index can say all are in one.
+    let cell = |x: Vector| <[f64; 3]>::from(x - center).map(|p| (p / (2.0 * hull.reach)).floor().clamp(-1e15, 1e15) as i64);
     let mut cells: BTreeMap<[i64; 3], Vec<Place>> = BTreeMap::new();
     let mut places = Vec::new();
     for i in 0..count {
