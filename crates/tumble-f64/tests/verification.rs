@@ -14,6 +14,7 @@ mod chains;
 mod character;
 mod clamps;
 mod cloth;
+mod clumps;
 mod contact;
 mod contact_cost;
 mod contact_sweep;

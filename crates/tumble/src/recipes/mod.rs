@@ -6,6 +6,7 @@
 
 mod block;
 mod cloth;
+mod clump;
 mod cut;
 mod dress;
 mod emitter;
@@ -28,6 +29,7 @@ mod surface;
 
 pub use block::block;
 pub use cloth::cloth;
+pub use clump::crowded;
 pub use emitter::{emitter, region};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
