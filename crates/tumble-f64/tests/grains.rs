@@ -7,7 +7,7 @@ use crate::common;
 use common::{Vector, column, positions, run, simulation, slope, step, velocities};
 use std::f64::consts::{PI, TAU};
 use tumble_f64::scene::Simulation;
-use tumble_interface::{Assets, Engine, Scene};
+use tumble_interface::{Assets, Engine, Mesh, Scene};
 
 const G: f64 = 9.81;
 const LAWS: [&str; 2] = ["hertz", "linear"];
@@ -498,6 +498,52 @@ fn what_is_wrong_with_grains_is_told_at_once_with_a_cure() {
         grains("g", &format!("radius = 0.01\n{full}"))
     ));
     assert!(told.len() >= 2 && told.iter().any(|t| t.starts_with("dimension")) && told.iter().any(|t| t.contains("clamp")), "{told:?}");
+}
+
+/// A closed ring of square section around z, 0.1 m high, with radii of 0.1 and 0.3 m.
+fn ring() -> Mesh {
+    let n = 48_u32;
+    let corners = [[0.1, 0.0], [0.3, 0.0], [0.3, 0.1], [0.1, 0.1]];
+    let vertices = (0..n).flat_map(|i| {
+        let turn = TAU * f64::from(i) / f64::from(n);
+        corners.map(|[r, z]| [r * turn.cos(), r * turn.sin(), z])
+    });
+    let quads =
+        (0..n).flat_map(|i| (0..4).map(move |k| [i * 4 + k, i * 4 + (k + 1) % 4, (i + 1) % n * 4 + (k + 1) % 4, (i + 1) % n * 4 + k]));
+    let triangles = quads.flat_map(|[a, b, c, d]| [[a, d, c], [a, c, b]]).collect();
+    Mesh { vertices: vertices.collect(), triangles, ..Mesh::default() }
+}
+
+#[test]
+fn fills_keep_within_meshes_and_other_solids() {
+    let build = |within: &str, mesh: Mesh| {
+        let fill = format!("fill = [{{ center = [0, 0, 0.05], size = [0.8, 0.8, 0.4], within = {within} }}]");
+        let text = format!("version = 1\n{}", grains("sand", &format!("radius = 0.01\nradius_spread = 0.1\n{fill}")));
+        let assets = Assets::new(std::collections::HashMap::from([("ring.obj".to_string(), mesh)]), Default::default());
+        Simulation::new(Scene::from_toml(&text).unwrap(), assets)
+    };
+    let within = "{ mesh = { path = \"ring.obj\" } }";
+    let sim = build(within, ring()).unwrap();
+    let x = positions(&sim, "sand");
+    // Flat sides bring the inner wall nearer, and the outer one.
+    let fits = |p: &Vector| (0.11..0.29).contains(&p.x.hypot(p.y)) && (0.01..0.09).contains(&p.z);
+    // Of each layer of 2.42 cm squares nearly those whose centres have room.
+    let layers = (0.1_f64 / 0.0242).floor();
+    let room = PI * (0.29_f64.powi(2) - 0.11_f64.powi(2)) / 0.0242_f64.powi(2);
+    assert!(x.iter().all(fits) && x.len() as f64 > 0.8 * room * (layers - 1.0), "{} of {room} in each of {layers}", x.len());
+    let sim = build("{ sphere = { center = [0, 0, 0], radius = 0.2 } }", ring()).unwrap();
+    let x = positions(&sim, "sand");
+    assert!(x.iter().all(|p| p.norm() < 0.19) && x.len() > 200, "{}", x.len());
+    // An open mesh has no inside; and nothing fits where there is no room.
+    let mut open = ring();
+    open.triangles.truncate(300);
+    let small = "{ sphere = { center = [0, 0, 0], radius = 0.01 } }";
+    for (within, mesh, path, cure) in
+        [(within, open, "grains \"sand\".fill[0].within.mesh", "open"), (small, ring(), "grains \"sand\".fill[0].within", "lower radius")]
+    {
+        let issues = build(within, mesh).err().unwrap().issues;
+        assert!(issues.len() == 1 && issues[0].path == path && issues[0].message.contains(cure), "{issues:?}");
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod chains;
 mod character;
 mod clamps;
 mod cloth;
+mod clumps;
 mod compounds;
 mod contact;
 mod contact_cost;

@@ -1,10 +1,10 @@
 //! Grains.
 
-use super::items_above_zero;
+use super::{Shape, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Spheres of a granular material, moved by systems of method `grains`: they touch, slide and roll on each other, on colliders and on rigid bodies.
+/// Spheres of a granular material, or rigid unions of spheres, moved by systems of method `grains`: they touch, slide and roll on each other, on colliders and on rigid bodies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grains {
@@ -13,20 +13,29 @@ pub struct Grains {
     /// The system that moves them. Default: the first of method `grains`.
     #[serde(default)]
     pub system: Option<String>,
-    /// Radius of a grain, the mean if they differ.
+    /// Radius of a grain, or of a sphere of a clump; the mean if they differ.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
     /// How far radii differ from that, at most, as a part of it: they are uniformly distributed.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.5), extend("x-unit" = "1"))]
     pub radius_spread: f64,
-    /// Initial positions. Alternative: `fill`.
+    /// Rigid unions of spheres instead of spheres: `"dumbbell"`, `"tetrahedron"`, or `{ spheres = [[0, 0, 0, 1], [1.2, 0, 0, 0.8]] }`. They interlock, so
+    /// that heaps are steeper.
+    #[serde(default)]
+    pub clump: Option<GrainClump>,
+    /// Initial positions; of clumps those of the mean of their spheres, weighted by volume. Alternative: `fill`.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub position: Vec<[f64; 3]>,
     /// Volumes that are filled at the start, loosely: grains settle to two thirds of the height.
     #[serde(default)]
     pub fill: Vec<GrainFill>,
+    /// Initial rotations of clumps about the x, then the y, then the z axis: one for all, or one for each position. Default: none at positions, any in
+    /// fills.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: Vec<[f64; 3]>,
     /// Initial velocity: one for all grains, or one for each position.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -79,13 +88,53 @@ impl Grains {
     pub fn spacing(&self) -> f64 {
         /// Free space between grains of the largest size, over their diameter.
         const GAP: f64 = 0.1;
-        2.0 * self.radius * (1.0 + self.radius_spread) * (1.0 + GAP)
+        2.0 * self.reach() * (1.0 + GAP)
     }
 
-    /// How many grains there are, at most.
+    /// Radius of the ball that holds the largest grain [m].
+    pub fn reach(&self) -> f64 {
+        self.radius * (1.0 + self.radius_spread) * self.clump.as_ref().map_or(1.0, GrainClump::reach)
+    }
+
+    /// How many spheres there are, at most.
     pub fn count(&self) -> f64 {
         let of = |fill: &GrainFill| fill.places(self.spacing()).iter().product::<f64>().min(fill.count.map_or(f64::INFINITY, f64::from));
-        self.position.len() as f64 + self.fill.iter().map(of).sum::<f64>()
+        let each = self.clump.as_ref().map_or(1, |clump| clump.spheres().len());
+        each as f64 * (self.position.len() as f64 + self.fill.iter().map(of).sum::<f64>())
+    }
+}
+
+/// A rigid union of spheres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum GrainClump {
+    /// Two spheres that touch.
+    Dumbbell,
+    /// Four spheres that touch each other.
+    Tetrahedron,
+    /// These spheres, of one density; where they overlap, matter counts once.
+    Spheres(Vec<[f64; 4]>),
+}
+
+impl GrainClump {
+    /// Its spheres, x, y, z and radius, over the `radius` of the grains, about their mean, weighted by volume.
+    pub fn spheres(&self) -> Vec<[f64; 4]> {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let spheres = match self {
+            Self::Dumbbell => vec![[-1.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0]],
+            Self::Tetrahedron => [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]]
+                .map(|[x, y, z]| [half * x, half * y, half * z, 1.0])
+                .to_vec(),
+            Self::Spheres(spheres) => spheres.clone(),
+        };
+        let volume: f64 = spheres.iter().map(|s| s[3].powi(3)).sum();
+        let mean = [0, 1, 2].map(|a| spheres.iter().map(|s| s[3].powi(3) * s[a]).sum::<f64>() / volume);
+        spheres.iter().map(|[x, y, z, r]| [x - mean[0], y - mean[1], z - mean[2], *r]).collect()
+    }
+
+    /// How far it reaches from that mean, over the `radius` of the grains.
+    fn reach(&self) -> f64 {
+        self.spheres().iter().map(|[x, y, z, r]| (x * x + y * y + z * z).sqrt() + r).reduce(f64::max).unwrap_or(1.0)
     }
 }
 
@@ -102,6 +151,9 @@ pub struct GrainFill {
     /// Its shape.
     #[serde(default)]
     pub shape: FillShape,
+    /// Only grains that lie wholly in this solid, too, such as a closed mesh.
+    #[serde(default)]
+    pub within: Option<Shape>,
     /// How many grains, from the bottom up. Default: as many as fit.
     #[serde(default)]
     #[schemars(range(min = 1, max = 100_000_000))]

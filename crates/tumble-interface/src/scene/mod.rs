@@ -33,7 +33,7 @@ pub use gas::{
     Advections, Carriage, Densities, ExcessFlow, Fire, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure,
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
-pub use grains::{FillShape, GrainFill, Grains, Granular, NormalLaw};
+pub use grains::{FillShape, GrainClump, GrainFill, Grains, Granular, NormalLaw};
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
@@ -344,6 +344,13 @@ impl Scene {
         for Body { name, shape, .. } in &mut self.body {
             let files = shape.mesh_files_mut().into_iter();
             all.extend(files.map(|(key, mesh)| one(format!("body \"{name}\".shape{key}"), mesh)));
+        }
+        for Grains { name, fill, .. } in &mut self.grains {
+            for (k, fill) in fill.iter_mut().enumerate() {
+                if let Some(Shape::Mesh(mesh)) = &mut fill.within {
+                    all.push(one(format!("grains \"{name}\".fill[{k}].within.mesh"), mesh));
+                }
+            }
         }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);

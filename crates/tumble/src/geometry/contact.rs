@@ -176,6 +176,15 @@ impl Collider {
         }
     }
 
+    /// The same solid, a mesh by its triangles instead of a grid of distances.
+    pub fn by_triangles(&self) -> Self {
+        let shape = match &self.shape {
+            Shape::Mesh { facets, shell, .. } => Shape::Animated { facets: facets.clone(), shell: *shell },
+            other => other.clone(),
+        };
+        Self { shape, ..self.clone() }
+    }
+
     /// Distance [m] of a point from every wall of a box that contains, and the direction away from it, the nearest first.
     fn walls(&self, p: Vector, t: f64) -> Option<[(f64, Vector); 6]> {
         let Shape::Box { center, half, turn } = &self.shape else { return None };

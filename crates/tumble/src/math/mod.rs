@@ -3,6 +3,7 @@
 pub mod animated;
 pub mod column;
 pub mod dual;
+pub mod eigen;
 pub mod formula;
 pub mod functions;
 pub mod lane;

@@ -220,7 +220,12 @@ fn cause_of(rule: &Rule) -> Cause {
 
 /// A shape that only bounds a region: no mesh. `Err` says what is wrong with which key.
 pub fn region(shape: &Solid) -> Result<crate::geometry::Collider, (String, String)> {
-    solid(&bounds(shape), &[], None, &[]).map_err(|(key, message)| (key.trim_start_matches(".shape").to_string(), message))
+    volume(shape, &[])
+}
+
+/// The same, or a closed mesh that has been loaded.
+pub fn volume(shape: &Solid, meshes: &[Mesh]) -> Result<crate::geometry::Collider, (String, String)> {
+    solid(&bounds(shape), meshes, None, &[]).map_err(|(key, message)| (key.trim_start_matches(".shape").to_string(), message))
 }
 
 /// A solid that only bounds a region.

@@ -1,9 +1,14 @@
 //! Grains: where they start, and how large each is.
 
+use super::clump;
+use super::emitter::volume;
 use crate::geometry::Vector;
-use crate::math::Random;
-use crate::systems::grains::Grain;
+use crate::math::functions::{cos, sin};
+use crate::math::rotation::from_degrees;
+use crate::math::{Quat, Random};
+use crate::systems::grains::{Clump, Grain};
 use std::f64::consts::PI;
+use tumble_interface::Mesh;
 use tumble_interface::check::short;
 use tumble_interface::scene::{FillShape, GrainFill, Grains as Words};
 
@@ -13,23 +18,40 @@ type Wrong = (String, String);
 // Purposes of random numbers.
 const RADIUS: u32 = 0;
 const PLACE: u32 = 1;
+const TURN: u32 = 2;
 
-/// The grains of an object, or all that is wrong with them.
-pub fn grains(words: &Words, seed: u32) -> Result<Vec<Grain>, Vec<Wrong>> {
+/// Grains, and the clumps that they make, with the place of each grain [m] in the axes of its own.
+pub struct Made {
+    pub grains: Vec<Grain>,
+    pub clumps: Vec<Clump>,
+    pub local: Vec<Vector>,
+}
+
+/// The grains of an object, with the meshes that its fills name, or all that is wrong with them.
+pub fn grains(words: &Words, seed: u32, meshes: &[Vec<Mesh>]) -> Result<Made, Vec<Wrong>> {
     let random = Random::new(seed, &words.name);
     let mut wrong = Vec::new();
     let mut places: Vec<Vector> = words.position.iter().map(|x| Vector::from(*x)).collect();
     let given = places.len();
+    let union = words.clump.as_ref().map(clump::union).transpose();
+    if let Err((key, message)) = &union {
+        // What it is like says how much room it takes.
+        return Err(vec![(format!(".clump{key}"), message.clone())]);
+    }
+    let union = union.ok().flatten();
+    if !words.rotate.is_empty() && union.is_none() {
+        wrong.push((".rotate".into(), "given to balls; leave it out, or give them a clump".into()));
+    }
     if given == 0 && words.fill.is_empty() {
         wrong.push((String::new(), "no grain; give it position, or fill".into()));
     }
     for (k, fill) in words.fill.iter().enumerate() {
-        match filled(words, fill, &random, places.len()) {
+        match filled(words, fill, meshes.get(k).map_or(&[], Vec::as_slice), &random, places.len()) {
             Ok(more) => places.extend(more),
             Err((key, message)) => wrong.push((format!(".fill[{k}].{key}"), message)),
         }
     }
-    let lists = [("velocity", &words.velocity), ("angular_velocity", &words.angular_velocity)];
+    let lists = [("rotate", &words.rotate), ("velocity", &words.velocity), ("angular_velocity", &words.angular_velocity)];
     for (key, list) in lists {
         let fits = list.len() < 2 || (words.fill.is_empty() && list.len() == given);
         if !fits {
@@ -42,19 +64,45 @@ pub fn grains(words: &Words, seed: u32) -> Result<Vec<Grain>, Vec<Wrong>> {
         return Err(wrong);
     }
     let each = |list: &[[f64; 3]], i: usize| Vector::from(list.get(i).or(list.first()).copied().unwrap_or_default());
-    let grain = |(i, x): (usize, &Vector)| {
+    let mut made = Made { grains: Vec::new(), clumps: Vec::new(), local: Vec::new() };
+    for (i, x) in places.iter().enumerate() {
         let [u, ..] = random.uniform(i as u64, 0, RADIUS);
         let radius = words.radius * (1.0 + words.radius_spread * (2.0 * u - 1.0));
-        let mass = 4.0 / 3.0 * PI * radius * radius * radius * words.density;
-        Grain { x: *x, radius, mass, v: each(&words.velocity, i), w: each(&words.angular_velocity, i) }
-    };
-    Ok(places.iter().enumerate().map(grain).collect())
+        let [v, w] = [each(&words.velocity, i), each(&words.angular_velocity, i)];
+        let Some(union) = &union else {
+            let mass = 4.0 / 3.0 * PI * radius * radius * radius * words.density;
+            made.grains.push(Grain { x: *x, radius, mass, v, w });
+            made.local.push(Vector::default());
+            continue;
+        };
+        let turn = match words.rotate.get(i).or(words.rotate.first()) {
+            Some(angles) => from_degrees(*angles),
+            None if i < given => from_degrees([0.0; 3]),
+            None => any_turn(random.uniform(i as u64, 0, TURN)),
+        };
+        let first = made.grains.len() as u32;
+        let (clump, spheres) = union.clump([radius, words.density], [*x, v, w], turn, first);
+        for (local, radius) in spheres {
+            let arm = clump.q.turn(local);
+            made.grains.push(Grain { x: clump.x + arm, radius, mass: clump.mass, v: clump.v + w.cross(arm), w });
+            made.local.push(local);
+        }
+        made.clumps.push(clump);
+    }
+    Ok(made)
+}
+
+/// A rotation, all alike likely, of three numbers that are uniform between 0 and 1 [shoemake1992].
+fn any_turn([a, b, c, _]: [f64; 4]) -> Quat<f64> {
+    let [s, t] = [(1.0 - a).sqrt(), a.sqrt()];
+    let [b, c] = [b, c].map(|u| 2.0 * PI * u);
+    Quat::from_row([s * sin(b), s * cos(b), t * sin(c), t * cos(c)])
 }
 
 /// Places in a volume, layer by layer from the bottom: on a cubic lattice, each moved at random within the gap to its neighbours.
-fn filled(words: &Words, fill: &GrainFill, random: &Random, first: usize) -> Result<Vec<Vector>, Wrong> {
+fn filled(words: &Words, fill: &GrainFill, meshes: &[Mesh], random: &Random, first: usize) -> Result<Vec<Vector>, Wrong> {
     let spacing = words.spacing();
-    let gap = spacing - 2.0 * words.radius * (1.0 + words.radius_spread);
+    let gap = spacing - 2.0 * words.reach();
     let [nx, ny, nz] = fill.places(spacing).map(|n| n as usize);
     let reach: [f64; 3] = fill.size.map(|size| 0.5 * (size - spacing));
     let inside = |p: [f64; 3]| {
@@ -77,17 +125,26 @@ fn filled(words: &Words, fill: &GrainFill, random: &Random, first: usize) -> Res
     let at = |i: usize, n: usize| (i as f64 - 0.5 * (n as f64 - 1.0)) * spacing;
     let lattice = (0..nz).flat_map(|k| (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k])));
     let places = lattice.map(|[i, j, k]| [at(i, nx), at(j, ny), (k as f64 + 0.5) * spacing - 0.5 * fill.size[2]]).filter(|p| inside(*p));
+    let solid = fill.within.as_ref().map(|shape| volume(shape, meshes)).transpose();
+    // By its triangles: the distance of a grid is off by parts of its cells.
+    let solid = solid.map_err(|(key, message)| (format!("within{key}"), message))?.map(|solid| solid.by_triangles());
+    let held = |p: &Vector| solid.as_ref().is_none_or(|solid| solid.distance(*p, 0.0, words.reach()).0 <= -words.reach());
     let count = fill.count.map_or(usize::MAX, |count| count as usize);
     let moved = |(n, p): (usize, [f64; 3])| {
         let u = random.uniform((first + n) as u64, 0, PLACE);
         Vector::from(std::array::from_fn::<f64, 3, _>(|a| fill.center[a] + p[a] + gap * (u[a] - 0.5)))
     };
-    let places: Vec<Vector> = places.take(count).enumerate().map(moved).collect();
+    let places: Vec<Vector> = places.enumerate().map(moved).filter(held).take(count).collect();
+    if places.is_empty() && solid.is_some() {
+        let message =
+            format!("no grain of up to {} m lies in it and in the box; enlarge or move one of them, or lower radius", short(words.reach()));
+        return Err(("within".into(), message));
+    }
     if places.is_empty() {
         let message = format!(
             "{:?} m holds no grain of up to {} m; make each edge at least {} m, or lower radius",
             fill.size,
-            short(words.radius * (1.0 + words.radius_spread)),
+            short(words.reach()),
             short(spacing)
         );
         return Err(("size".into(), message));

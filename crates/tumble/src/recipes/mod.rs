@@ -8,6 +8,7 @@ mod arrange;
 mod block;
 mod body_shape;
 mod cloth;
+mod clump;
 mod convex_parts;
 mod cut;
 mod dress;
@@ -31,6 +32,7 @@ mod surface;
 
 pub use block::block;
 pub use cloth::cloth;
+pub use clump::crowded;
 pub use emitter::{emitter, region};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;

@@ -10,7 +10,7 @@
 use super::{Constraints, Projection};
 use crate::geometry::Walls;
 use crate::math::parallel::{chunks, fold};
-use crate::math::{Quat, Real, Row, Vec3, xyz64};
+use crate::math::{Quat, Real, Row, Vec3, eigen, xyz64};
 use std::ops::Range;
 
 type Vector = Vec3<f64>;
@@ -104,43 +104,10 @@ fn rotation(s: [Vector; 3]) -> Quat<f64> {
     Quat { v: Vec3 { x, y, z }, w }
 }
 
-/// The eigenvector of the largest eigenvalue of a symmetric matrix, by Jacobi's rotations in fixed order.
-fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
-    let mut v = [[0.0; 4]; 4];
-    (0..4).for_each(|i| v[i][i] = 1.0);
-    // Quadratic convergence: five sweeps reach round-off, more find nothing to turn.
-    for _ in 0..12 {
-        let mut turned = false;
-        for p in 0..3 {
-            for q in p + 1..4 {
-                let off = a[p][q];
-                if off.abs() <= 1e-17 * (a[p][p].abs() + a[q][q].abs()) {
-                    continue;
-                }
-                turned = true;
-                let theta = (a[q][q] - a[p][p]) / (2.0 * off);
-                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let cos = 1.0 / (t * t + 1.0).sqrt();
-                let sin = t * cos;
-                for k in 0..4 {
-                    let (x, y) = (a[k][p], a[k][q]);
-                    (a[k][p], a[k][q]) = (cos * x - sin * y, sin * x + cos * y);
-                }
-                for k in 0..4 {
-                    let (x, y) = (a[p][k], a[q][k]);
-                    (a[p][k], a[q][k]) = (cos * x - sin * y, sin * x + cos * y);
-                }
-                for row in &mut v {
-                    let (x, y) = (row[p], row[q]);
-                    (row[p], row[q]) = (cos * x - sin * y, sin * x + cos * y);
-                }
-            }
-        }
-        if !turned {
-            break;
-        }
-    }
-    let most = (1..4).fold(0, |best, i| if a[i][i] > a[best][best] { i } else { best });
+/// The eigenvector of the largest eigenvalue of a symmetric matrix.
+fn largest_eigenvector(a: [[f64; 4]; 4]) -> [f64; 4] {
+    let (values, v) = eigen::symmetric(a);
+    let most = (1..4).fold(0, |best, i| if values[i] > values[best] { i } else { best });
     let norm = v.iter().map(|row| row[most] * row[most]).sum::<f64>().sqrt();
     v.map(|row| row[most] / norm)
 }

@@ -7,13 +7,13 @@ use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::scene::plausible::odd_density;
 use crate::system::System;
-use crate::systems::grains::{Grains as Bed, Material, Object, Overlaps, Settings, longest_step};
+use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Overlaps, Settings, longest_step};
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{Grains, Integrator, Method, NormalLaw, Scene, System as Plan};
+use tumble_interface::scene::{GrainFill, Grains, Integrator, Method, NormalLaw, Scene, Shape, System as Plan};
 use tumble_interface::warning::Code;
-use tumble_interface::{Issue, Warning};
+use tumble_interface::{Issue, Mesh, Warning};
 
 /// Bytes for a grain: its rows, some eight candidates, contacts that remember, and a snapshot.
 const GRAIN: f64 = 1000.0;
@@ -40,7 +40,11 @@ fn law(plan: &Plan) -> NormalLaw {
 /// The longest step that resolves all contacts of a system [s].
 fn step(scene: &Scene, plan: &Plan) -> f64 {
     let own = scene.grains.iter().filter(|t| is_in(&t.system, plan));
-    let of = |t: &Grains| longest_step(law(plan), &material(t), t.radius * (1.0 - t.radius_spread), t.density);
+    let of = |t: &Grains| {
+        // The matter of a clump is borne by all of its spheres.
+        let [least, share, count] = t.clump.as_ref().and_then(recipes::crowded).unwrap_or([1.0; 3]);
+        longest_step(law(plan), &material(t), least * t.radius * (1.0 - t.radius_spread), share * t.density, count)
+    };
     own.map(of).fold(f64::INFINITY, f64::min)
 }
 
@@ -117,13 +121,22 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
-        let (mut objects, mut all) = (Vec::new(), Vec::new());
+        let (mut objects, mut all, mut clumps, mut local) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for thing in scene.grains.iter().filter(|t| is_in(&t.system, plan)) {
-            match recipes::grains(thing, scene.seed) {
-                Ok(grains) => {
-                    let range = all.len()..all.len() + grains.len();
+            let mesh_of = |fill: &GrainFill| match &fill.within {
+                Some(Shape::Mesh(file)) => builder.assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)).into_iter().collect(),
+                _ => Vec::new(),
+            };
+            let meshes: Vec<Vec<Mesh>> = thing.fill.iter().map(mesh_of).collect();
+            match recipes::grains(thing, scene.seed, &meshes) {
+                Ok(made) => {
+                    let range = all.len()..all.len() + made.grains.len();
+                    let first = all.len() as u32;
+                    let moved = |c: Clump| Clump { spheres: c.spheres.start + first..c.spheres.end + first, ..c };
                     objects.push((Object { name: thing.name.clone(), grains: range }, material(thing)));
-                    all.extend(grains);
+                    all.extend(made.grains);
+                    local.extend(made.local);
+                    clumps.extend(made.clumps.into_iter().map(moved));
                 }
                 Err(wrong) => {
                     let issue = |(key, message): (String, String)| Issue::new(format!("grains \"{}\"{key}", thing.name), message);
@@ -140,7 +153,7 @@ impl MethodRules for Rules {
             law: law(plan),
             gravity: builder.gravity.clone(),
         };
-        let mut system = Bed::new(settings, objects, &all);
+        let mut system = Bed::new(settings, objects, &all, Clumps::new(clumps, local));
         if builder.issues.is_empty() {
             // Bodies, too, where they start.
             let bodies = if touches(scene) { surfaces(scene, builder.assets) } else { Vec::new() };

@@ -1,5 +1,6 @@
 //! Grains and their motion.
 
+use super::clumps::{Clumps, Moved};
 use super::law::{BALL, Pair};
 use super::list::{Four, Kept, List, Part, point};
 use super::press::Rows;
@@ -30,6 +31,17 @@ impl Kick {
     }
 }
 
+/// A grain as the books see it.
+pub struct Body {
+    /// Mass [kg], and its centre [m].
+    pub mass: f64,
+    pub center: Vector,
+    /// Momentum [N s], and angular momentum about the origin [N m s].
+    pub momenta: [Vector; 2],
+    /// Kinetic energy [J].
+    pub kinetic: f64,
+}
+
 /// Grains in the order of their cells.
 #[derive(Debug, Default)]
 pub struct Bed {
@@ -48,6 +60,8 @@ pub struct Bed {
     /// grain; and half of what the last forces gave both.
     pub quick: Vec<Row>,
     pub last: Vec<[Row; 2]>,
+    /// Grains that are spheres of clumps.
+    pub clumps: Clumps,
     /// The pair of each kind with each.
     pub pairs: Vec<Pair>,
     pub kinds: usize,
@@ -74,6 +88,7 @@ impl Bed {
             *rows = order.iter().map(|row| rows[*row as usize]).collect();
         }
         self.grain = order.iter().map(|row| self.grain[*row as usize]).collect();
+        self.clumps.sort(&self.grain);
         self.rebuild(walls, t, Some(&order));
     }
 
@@ -83,7 +98,7 @@ impl Bed {
         let from = from.unwrap_or(&same);
         let mut to = vec![0; self.x.len()];
         from.iter().enumerate().for_each(|(row, old)| to[*old as usize] = row as u32);
-        self.list.rebuild(&self.x, from, self.turns());
+        self.list.rebuild(&self.x, from, self.turns(), &self.clumps);
         // Both may go that far.
         walls.rebuild(&self.x, self.list.chunk, t, 2.0 * self.list.slack, &to);
         self.travel = 0.0;
@@ -121,7 +136,7 @@ impl Bed {
 
     /// Velocities change by forces and gravity.
     pub fn kick(&mut self, gravity: Vector, kick: Kick) {
-        let Self { x, v, w, force, torque, quick, last, .. } = self;
+        let Self { x, v, w, force, torque, quick, last, clumps, .. } = self;
         let (x, force, torque) = (&*x, &*force, &*torque);
         last.resize(x.len(), [[0.0; 4]; 2]);
         let quick = quick.chunks_mut(QUICK * CHUNK).zip(last.chunks_mut(CHUNK));
@@ -137,10 +152,24 @@ impl Bed {
                 }
             }
         });
+        clumps.kick(x, [force, torque], gravity, kick);
+    }
+
+    fn moved(&mut self) -> (&mut Clumps, Moved<'_>) {
+        let Self { x, v, w, quick, grain, clumps, .. } = self;
+        (clumps, Moved { x, v, w, quick, grain })
+    }
+
+    /// Gives spheres of clumps the velocities that these have at the end of an interval.
+    pub fn settle(&mut self) {
+        let (clumps, rows) = self.moved();
+        clumps.settle(rows);
     }
 
     /// Grains move for h [s].
     pub fn drift(&mut self, walls: &mut Walls, t: f64, h: f64) {
+        let (clumps, rows) = self.moved();
+        clumps.drift(rows, h);
         let v = &self.v;
         let parts: Vec<(f64, f64)> = self.x.chunks_mut(CHUNK).enumerate().map_in_parallel(|(c, x)| {
             let (mut fastest, mut farthest) = (0.0_f64, 0.0_f64);
@@ -163,7 +192,8 @@ impl Bed {
     pub fn remember(&mut self, contacts: &[([u32; 2], Kept)]) {
         let same: Vec<u32> = (0..self.x.len() as u32).collect();
         self.list.remember(self.x.len(), contacts, self.turns());
-        self.list.rebuild(&self.x, &same, self.turns());
+        self.clumps.sort(&self.grain);
+        self.list.rebuild(&self.x, &same, self.turns(), &self.clumps);
     }
 
     /// Moves candidates that overlap, and those in solids, apart: how many did, and how deep the deepest was [m].
@@ -176,23 +206,24 @@ impl Bed {
             if depth > 0.0 {
                 let normal = if way.norm() > 0.0 { way.normalized() } else { Vector { x: 0.0, y: 0.0, z: 1.0 } };
                 let share = self.v[a][3] / (self.v[a][3] + self.v[b][3]);
-                add(&mut self.x[a], normal * (-depth * share));
-                add(&mut self.x[b], normal * (depth * (1.0 - share)));
+                self.clumps.shift(&mut self.x, a, normal * (-depth * share));
+                self.clumps.shift(&mut self.x, b, normal * (depth * (1.0 - share)));
                 (count, deepest) = (count + 1, deepest.max(depth));
             }
         }
-        for x in &mut self.x {
+        for row in 0..self.x.len() {
             for surface in 0..walls.solids() {
-                let (p, mut shift) = (point(x), Vector::default());
-                walls.each_near(surface, p, 0.0, (x[3], true), |distance, normal| {
-                    let depth = x[3] - distance - shift.dot(normal);
+                let (p, radius, mut shift) = (point(&self.x[row]), self.x[row][3], Vector::default());
+                walls.each_near(surface, p, 0.0, (radius, true), |distance, normal| {
+                    let depth = radius - distance - shift.dot(normal);
                     if depth > 0.0 {
                         (shift, count, deepest) = (shift + normal * depth, count + 1, deepest.max(depth));
                     }
                 });
-                add(x, shift);
+                self.clumps.shift(&mut self.x, row, shift);
             }
         }
+        self.clumps.follow(&self.x);
         (count, deepest)
     }
 
@@ -220,17 +251,22 @@ impl Bed {
         self.list.parts.iter().map_in_parallel(of).into_iter().fold((0.0, None, 0), |a, b| (a.0 + b.0, larger(a.1, b.1), a.2 + b.2))
     }
 
-    /// Kinetic energy of a row [J].
-    pub fn kinetic(&self, row: usize) -> f64 {
-        let [radius, inverse] = [self.x[row][3], self.v[row][3]];
-        0.5 / inverse * (point(&self.v[row]).norm_sq() + BALL * radius * radius * point(&self.w[row]).norm_sq())
+    /// What moves as a row says; of a clump its first sphere stands for all.
+    pub fn body(&self, row: usize) -> Option<Body> {
+        if let Some(clump) = self.clumps.at(row) {
+            let first = clump.spheres.start == self.grain[row];
+            let body = || Body { mass: clump.mass, center: clump.x, momenta: clump.momenta(), kinetic: clump.kinetic() };
+            return first.then(body);
+        }
+        let (mass, center, radius) = (1.0 / self.v[row][3], point(&self.x[row]), self.x[row][3]);
+        let (v, w, inertia) = (point(&self.v[row]), point(&self.w[row]), BALL * mass * radius * radius);
+        let momenta = [v * mass, center.cross(v * mass) + w * inertia];
+        Some(Body { mass, center, momenta, kinetic: 0.5 * (mass * v.norm_sq() + inertia * w.norm_sq()) })
     }
 
-    /// Momentum [N s], and angular momentum about the origin [N m s].
-    pub fn momenta(&self, row: usize) -> [Vector; 2] {
-        let (mass, radius) = (1.0 / self.v[row][3], self.x[row][3]);
-        let momentum = point(&self.v[row]) * mass;
-        [momentum, point(&self.x[row]).cross(momentum) + point(&self.w[row]) * (BALL * mass * radius * radius)]
+    /// Mass of a row [kg]: of a clump the same part for each of its spheres.
+    pub fn mass(&self, row: usize) -> f64 {
+        self.clumps.at(row).map_or(1.0 / self.v[row][3], |clump| clump.mass / clump.spheres.len() as f64)
     }
 
     /// The row of each grain.
@@ -253,6 +289,6 @@ impl Bed {
 }
 
 /// A vector in the engine's scalar.
-fn narrow(v: Vector) -> Row {
+pub fn narrow(v: Vector) -> Row {
     [v.x as Real, v.y as Real, v.z as Real, 0.0]
 }

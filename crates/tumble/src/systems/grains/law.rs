@@ -81,8 +81,9 @@ pub struct Overlap<L = f64> {
     /// R* [m], and the same of the distances of both centres from the point of contact.
     pub radius: L,
     pub lever: L,
-    /// m1 m2/(m1 + m2) [kg].
+    /// m1 m2/(m1 + m2) [kg], and one over it.
     pub mass: L,
+    pub inverse_mass: L,
 }
 
 /// Force on the first [N], and its moment apart from that of the force [N m].
@@ -199,7 +200,7 @@ impl<L: Lane> Pair<L> {
         let (away, gain) = (at.velocity.dot(n), at.gain.dot(n));
         let damping = self.damping * (stiffness * at.mass).sqrt();
         // The gain is by forces one and a half steps before; the contact's own have changed since.                  (grains.8)
-        let late = h * h.like(1.5) / at.mass * (stiffness * h * h.like(0.5) * away + damping * gain);
+        let late = h * h.like(1.5) * at.inverse_mass * (stiffness * h * h.like(0.5) * away + damping * gain);
         let press = (elastic - damping * (away + gain - late)).above_zero();
         let pull = self.cohesion * at.radius * h.like(std::f64::consts::TAU);
         let along = at.velocity - n * away;
@@ -262,8 +263,8 @@ impl<L: Lane> Pair<L> {
 }
 
 /// The longest step that resolves contact of grains of a material [s]: a fifth of the time in which a Rayleigh wave crosses half a grain, or a
-/// twentieth of a bounce; less where dampers need shorter ones.                                                      (grains.6)
-pub fn longest_step(law: NormalLaw, material: &Material, radius: f64, density: f64) -> f64 {
+/// twentieth of a bounce; less where dampers need shorter ones. A clump has contacts on so many `spheres`.             (grains.6)
+pub fn longest_step(law: NormalLaw, material: &Material, radius: f64, density: f64, spheres: f64) -> f64 {
     use std::f64::consts::PI;
     /// Overlap over the radius up to which steps are to be stable.
     const DEEP: f64 = 0.05;
@@ -277,7 +278,7 @@ pub fn longest_step(law: NormalLaw, material: &Material, radius: f64, density: f
     };
     let shear = 2.0 * (1.0 - poisson) / (2.0 - poisson);
     let mass = 4.0 / 3.0 * PI * density * radius.powi(3);
-    resolved.min(stable(damping(law, *restitution), shear) * (mass / stiffness).sqrt())
+    resolved.min(stable(damping(law, *restitution) * spheres.sqrt(), shear) * (mass / stiffness).sqrt())
 }
 
 /// The longest stable step, over √(m/k), of a grain between others that all move, or all turn, against it. With forces by the velocities of half a

@@ -4,6 +4,7 @@
 //! a grain: pairs across two chunks stand in both, and both compute the same bits. So no chunk writes what another reads, and each grain sums its
 //! pairs in the order of their rows, wherever chunks begin.                                                         (grains.5)
 
+use super::clumps::Clumps;
 use super::law::Memory;
 use crate::geometry::{Neighbours, Vector};
 use crate::math::parallel::Tasks;
@@ -122,7 +123,7 @@ impl List {
     }
 
     /// Seeks candidates anew; `before` are the rows that grains had in the last list. Without `turns` contacts remember slips alone.
-    pub fn rebuild(&mut self, x: &[Four], before: &[u32], turns: bool) {
+    pub fn rebuild(&mut self, x: &[Four], before: &[u32], turns: bool, clumps: &Clumps) {
         self.place(x);
         let mut found = std::mem::take(&mut self.found);
         found.resize_with(self.grid.len(), Vec::new);
@@ -134,7 +135,7 @@ impl List {
             for other in runs.iter().flat_map(|[first, end]| &order[*first as usize..*end as usize]) {
                 let there = &x[*other as usize];
                 let far = here[3] + there[3] + skin;
-                if *other != row && (point(there) - point(here)).norm_sq() < far * far {
+                if *other != row && !clumps.joins(row, *other) && (point(there) - point(here)).norm_sq() < far * far {
                     found.push(*other);
                 }
             }

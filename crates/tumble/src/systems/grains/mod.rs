@@ -6,11 +6,13 @@
 //! an overlap is a millionth of a place. The force of a pair is in the engine's scalar.
 
 mod bed;
+mod clumps;
 mod law;
 mod list;
 mod press;
 mod walls;
 
+pub use clumps::{Clump, Clumps};
 pub use law::{Material, longest_step};
 
 use crate::exchange::Turn;
@@ -19,7 +21,7 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::Real;
 use crate::system::{Archive, Part, System};
-use bed::{Bed, Kick};
+use bed::{Bed, Body, Kick};
 use law::{Dampings, Memory, Pair};
 use list::{Kept, List, point};
 use std::ops::Range;
@@ -48,7 +50,7 @@ pub struct Grain {
     pub x: Vector,
     /// Its radius [m].
     pub radius: f64,
-    /// Its mass [kg].
+    /// Its mass [kg], or that of its clump.
     pub mass: f64,
     /// Its velocity [m/s].
     pub v: Vector,
@@ -108,8 +110,8 @@ pub struct Overlaps {
 }
 
 impl Grains {
-    /// Objects with the materials of their grains; grains in the order of the objects.
-    pub fn new(settings: Settings, objects: Vec<(Object, Material)>, grains: &[Grain]) -> Self {
+    /// Objects with the materials of their grains; grains in the order of the objects, and the clumps that some of them make.
+    pub fn new(settings: Settings, objects: Vec<(Object, Material)>, grains: &[Grain], clumps: Clumps) -> Self {
         let (objects, kinds): (Vec<Object>, Vec<Material>) = objects.into_iter().unzip();
         let mut dampings = Dampings::default();
         let mut pairs = Vec::new();
@@ -120,7 +122,7 @@ impl Grains {
             grains.iter().fold([f64::INFINITY, 0.0_f64], |[least, largest], grain| [least.min(grain.radius), largest.max(grain.radius)]);
         let row = |v: Vector, number: f64| [v.x, v.y, v.z, number];
         let kind = |i: usize| objects.iter().position(|object| object.grains.contains(&i)).unwrap_or_default() as f64;
-        let bed = Bed {
+        let mut bed = Bed {
             x: grains.iter().map(|grain| row(grain.x, grain.radius)).collect(),
             v: grains.iter().map(|grain| row(grain.v, 1.0 / grain.mass)).collect(),
             w: grains.iter().enumerate().map(|(i, grain)| row(grain.w, kind(i))).collect(),
@@ -128,8 +130,10 @@ impl Grains {
             pairs,
             kinds: kinds.len(),
             list: List::new(grains.len(), radii),
+            clumps,
             ..Bed::default()
         };
+        bed.clumps.sort(&bed.grain);
         let walls = Walls::new(settings.law, kinds);
         Self { settings, objects, bed, walls, h: 0.0, scale: 0.0, tolerant: false }
     }
@@ -201,13 +205,12 @@ impl Grains {
         let (mut momentum, mut spin, mut speed) = (Vector::default(), Vector::default(), 0.0_f64);
         let mut ledger = Ledger { time: t, ..Ledger::default() };
         for row in rows.iter().map(|row| *row as usize) {
-            let mass = 1.0 / self.bed.v[row][3];
-            let [linear, angular] = self.bed.momenta(row);
+            speed = speed.max(point(&self.bed.v[row]).norm());
+            let Some(Body { mass, center, momenta: [linear, angular], kinetic }) = self.bed.body(row) else { continue };
             ledger.mass += mass;
             (momentum, spin) = (momentum + linear, spin + angular);
-            ledger.kinetic += self.bed.kinetic(row);
-            ledger.external -= mass * gravity.dot(point(&self.bed.x[row]));
-            speed = speed.max(point(&self.bed.v[row]).norm());
+            ledger.kinetic += kinetic;
+            ledger.external -= mass * gravity.dot(center);
         }
         Ledger { momentum: momentum.into(), angular_momentum: Some(spin.into()), speed: Some(speed), ..ledger }
     }
@@ -219,7 +222,7 @@ impl System for Grains {
     }
 
     fn version(&self) -> u32 {
-        1
+        2
     }
 
     /// Grains are no bodies that others push: they visit.
@@ -246,6 +249,7 @@ impl System for Grains {
             self.kick(time, Kick { h: if k < n { h } else { 0.5 * h }, step: h, first: false });
             report.stepped(h);
         }
+        self.bed.settle();
         self.walls.post(exchange);
         Ok(report)
     }
@@ -278,7 +282,7 @@ impl System for Grains {
             let of =
                 |number: &dyn Fn(usize) -> f64| rows[grains.clone()].iter().map(|row| number(*row as usize) as Real).collect::<Vec<_>>();
             out.push(Column::new(name, "radius", of(&|row| self.bed.x[row][3])));
-            out.push(Column::new(name, "mass", of(&|row| 1.0 / self.bed.v[row][3])));
+            out.push(Column::new(name, "mass", of(&|row| self.bed.mass(row))));
         }
     }
 
@@ -334,7 +338,7 @@ impl System for Grains {
         }
         // Contacts make no grain faster than sound, unless steps are too long for them.
         let fastest = self.bed.v.iter().map(|v| point(v).norm_sq()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        let kinetic = (0..self.bed.x.len()).map(|row| self.bed.kinetic(row)).sum::<f64>();
+        let kinetic = (0..self.bed.x.len()).filter_map(|row| self.bed.body(row)).map(|body| body.kinetic).sum::<f64>();
         let (row, square) = fastest?;
         let sudden = self.scale > 0.0 && kinetic > BLOW_UP * self.scale;
         if sudden && square > self.settings.sound * self.settings.sound && !self.tolerant {
@@ -374,12 +378,13 @@ impl System for Grains {
             [&three(c.normal)[..], &three(slip), &three(turn), &[c.depth, slides]].concat()
         });
         archive.push("walls", Part::Numbers(kept.collect()));
+        archive.push("clumps", Part::Numbers(self.bed.clumps.save()));
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let (grain, rows) = (archive.indices("grains")?, archive.numbers("rows")?);
         let (pairs, memories) = (archive.indices("pairs")?, archive.table_of(CONTACT, "contacts")?);
-        let (keys, kept) = (archive.indices("keys")?, archive.numbers("walls")?);
+        let (keys, kept, clumps) = (archive.indices("keys")?, archive.numbers("walls")?, archive.numbers("clumps")?);
         let count = self.bed.x.len();
         let mut sorted = grain.clone();
         sorted.sort_unstable();
@@ -390,6 +395,7 @@ impl System for Grains {
         if !(whole && fits && ordered(&pairs) && ordered(&keys)) {
             return None;
         }
+        self.bed.clumps.restore(&clumps)?;
         // What does not change goes along with its grain.
         let bed = &mut self.bed;
         let place = bed.rows();
@@ -431,7 +437,8 @@ impl System for Grains {
             "angular_velocity" => &mut self.bed.w,
             _ => return Some(false),
         };
-        if values.len() != 3 * grains.len() {
+        // Spheres of a clump have no motion of their own.
+        if values.len() != 3 * grains.len() || grains.clone().any(|grain| self.bed.clumps.at(rows[grain] as usize).is_some()) {
             return Some(false);
         }
         for (grain, value) in grains.zip(values.chunks_exact(3)) {

@@ -182,6 +182,7 @@ impl Pass<'_> {
         let depth = excess / (reach + distance);
         let arms = [radii[0] - half * depth, radii[1] - half * depth];
         let spins = [three(first_spin), three(second_spin)];
+        let inverse_mass = first[3] + second[3];
         let at_contact = Overlap {
             depth,
             normal,
@@ -192,7 +193,8 @@ impl Pass<'_> {
             radii,
             radius: radii[0] * radii[1] / reach,
             lever: arms[0] * arms[1] / (arms[0] + arms[1]),
-            mass: one / (first[3] + second[3]),
+            mass: one / inverse_mass,
+            inverse_mass,
         };
         let mut memory = Memory { slip: three(slip), turn: three(turn), slides: slip[3] };
         let law = Pair::from_numbers(pairs[0].law(), laws);

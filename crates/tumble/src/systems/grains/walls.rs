@@ -112,14 +112,8 @@ impl Walls {
         if Arc::ptr_eq(solids, &self.published) {
             return;
         }
-        let exact = |solid: &Collider| match &solid.shape {
-            // The distance of a grid is off by parts of its cells, more than a grain may overlap.
-            Shape::Mesh { facets, shell, .. } => {
-                Collider { shape: Shape::Animated { facets: facets.clone(), shell: *shell }, ..solid.clone() }
-            }
-            _ => solid.clone(),
-        };
-        (self.published, self.solids) = (solids.clone(), solids.iter().map(exact).collect());
+        // The distance of a grid is off by parts of its cells, more than a grain may overlap.
+        (self.published, self.solids) = (solids.clone(), solids.iter().map(Collider::by_triangles).collect());
         self.pairs = self.pairs_of(self.solids.iter().chain(self.shapes.iter().map(|shape| &**shape)));
     }
 
@@ -278,6 +272,7 @@ impl Walls {
                             radius,
                             lever: radius - depth,
                             mass: 1.0 / (inverse + yields),
+                            inverse_mass: inverse + yields,
                         };
                         let Some(pair) = walls.pair(s, kind as usize, t) else { return };
                         let answer = pair.answer(&at, h, &mut memory, pair.resists_turns());
