@@ -1,6 +1,7 @@
 //! Grains and their motion.
 
 use super::clumps::{Clumps, Moved};
+use super::kick::{Kick, QUICK, narrow};
 use super::law::{BALL, Pair};
 use super::list::{Four, Kept, List, Part, point};
 use super::press::Rows;
@@ -8,28 +9,6 @@ use super::walls::{Touched, Walls, add};
 use crate::geometry::Vector;
 use crate::math::parallel::{CHUNK, Tasks, fold};
 use crate::math::{Real, Row};
-
-/// Numbers of a grain in [`Bed::quick`].
-pub const QUICK: usize = 4;
-
-/// A change of velocities.
-#[derive(Debug, Clone, Copy)]
-pub struct Kick {
-    /// For so long [s], within a step of so long [s].
-    pub h: f64,
-    pub step: f64,
-    /// Whether it is the first of an interval, before which no forces are known.
-    pub first: bool,
-}
-
-impl Kick {
-    /// What a velocity gains in half a step by the mean of the last two accelerations, given that of the last [m/s²]; `last` is half of what the one
-    /// before gave, and becomes half of what this one gives.                                                         (grains.8)
-    pub fn gain(&self, acceleration: Vector, last: Vector) -> [Vector; 2] {
-        let half = acceleration * (0.25 * self.step);
-        [half + if self.first { half } else { last }, half]
-    }
-}
 
 /// A grain as the books see it.
 pub struct Body {
@@ -98,7 +77,7 @@ impl Bed {
         let from = from.unwrap_or(&same);
         let mut to = vec![0; self.x.len()];
         from.iter().enumerate().for_each(|(row, old)| to[*old as usize] = row as u32);
-        self.list.rebuild(&self.x, from, self.turns(), &self.clumps);
+        self.list.rebuild(&self.x, from, self.turns(), |a, b| self.clumps.joins(a, b));
         // Both may go that far.
         walls.rebuild(&self.x, self.list.chunk, t, 2.0 * self.list.slack, &to);
         self.travel = 0.0;
@@ -193,7 +172,7 @@ impl Bed {
         let same: Vec<u32> = (0..self.x.len() as u32).collect();
         self.list.remember(self.x.len(), contacts, self.turns());
         self.clumps.sort(&self.grain);
-        self.list.rebuild(&self.x, &same, self.turns(), &self.clumps);
+        self.list.rebuild(&self.x, &same, self.turns(), |a, b| self.clumps.joins(a, b));
     }
 
     /// Moves candidates that overlap, and those in solids, apart: how many did, and how deep the deepest was [m].
@@ -286,9 +265,4 @@ impl Bed {
         let column = [("position", &self.x), ("velocity", &self.v)].into_iter().find(|(_, rows)| !finite(&rows[row]));
         Some((row, column.map_or("angular_velocity", |(name, _)| name)))
     }
-}
-
-/// A vector in the engine's scalar.
-pub fn narrow(v: Vector) -> Row {
-    [v.x as Real, v.y as Real, v.z as Real, 0.0]
 }

@@ -5,7 +5,7 @@
 //! Spheres are rows of the bed, and feel forces there. The motion between two kicks is made of turns about the clump's own axes [dullweber1997], so that
 //! the angular momentum L is kept to round-off.
 
-use super::bed::{Kick, QUICK, narrow};
+use super::kick::{Kick, QUICK, narrow};
 use super::list::{Four, point};
 use super::walls::add;
 use crate::geometry::Vector;

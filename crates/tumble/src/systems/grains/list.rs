@@ -4,7 +4,6 @@
 //! a grain: pairs across two chunks stand in both, and both compute the same bits. So no chunk writes what another reads, and each grain sums its
 //! pairs in the order of their rows, wherever chunks begin.                                                         (grains.5)
 
-use super::clumps::Clumps;
 use super::law::Memory;
 use crate::geometry::{Neighbours, Vector};
 use crate::math::parallel::Tasks;
@@ -122,8 +121,9 @@ impl List {
         self.grid.rebuild(&rows);
     }
 
-    /// Seeks candidates anew; `before` are the rows that grains had in the last list. Without `turns` contacts remember slips alone.
-    pub fn rebuild(&mut self, x: &[Four], before: &[u32], turns: bool, clumps: &Clumps) {
+    /// Seeks candidates anew; `before` are the rows that grains had in the last list. Without `turns` contacts remember slips alone. Those
+    /// that are `joined` do not touch.
+    pub fn rebuild(&mut self, x: &[Four], before: &[u32], turns: bool, joined: impl Fn(u32, u32) -> bool + Sync) {
         self.place(x);
         let mut found = std::mem::take(&mut self.found);
         found.resize_with(self.grid.len(), Vec::new);
@@ -135,7 +135,7 @@ impl List {
             for other in runs.iter().flat_map(|[first, end]| &order[*first as usize..*end as usize]) {
                 let there = &x[*other as usize];
                 let far = here[3] + there[3] + skin;
-                if *other != row && !clumps.joins(row, *other) && (point(there) - point(here)).norm_sq() < far * far {
+                if *other != row && !joined(row, *other) && (point(there) - point(here)).norm_sq() < far * far {
                     found.push(*other);
                 }
             }

@@ -7,6 +7,7 @@
 
 mod bed;
 mod clumps;
+mod kick;
 mod law;
 mod list;
 mod press;
@@ -21,7 +22,8 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::Real;
 use crate::system::{Archive, Part, System};
-use bed::{Bed, Body, Kick};
+use bed::{Bed, Body};
+use kick::Kick;
 use law::{Dampings, Memory, Pair};
 use list::{Kept, List, point};
 use std::ops::Range;

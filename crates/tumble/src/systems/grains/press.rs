@@ -1,6 +1,6 @@
 //! The contact pass over pairs of grains: those that touch, side by side in registers.
 
-use super::bed::QUICK;
+use super::kick::QUICK;
 use super::law::{Memory, NUMBERS, Overlap, Pair};
 use super::list::{Four, Pairs, Part};
 use crate::math::simd::{Kernel, Width, dispatch};
@@ -10,7 +10,7 @@ use crate::math::{Lane, Real, Row, Vec3};
 pub struct Rows<'a> {
     pub x: &'a [Four],
     pub w: &'a [Four],
-    /// [`Bed::quick`](super::bed::Bed::quick).
+    /// `Bed::quick`.
     pub quick: &'a [Row],
     /// The pair of each kind with each.
     pub pairs: &'a [Pair],

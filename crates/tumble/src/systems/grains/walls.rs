@@ -1,6 +1,6 @@
 //! Contact of grains with solids, and with rigid bodies, which yield.
 
-use super::bed::{Kick, QUICK};
+use super::kick::{Kick, QUICK};
 use super::law::{Dampings, Material, Memory, Overlap, Pair};
 use super::list::{Four, point};
 use crate::exchange::{Exchange, Turn, Visit};
@@ -60,7 +60,7 @@ pub struct Touched<'a> {
     pub x: &'a [Four],
     pub v: &'a [Four],
     pub w: &'a [Four],
-    /// [`Bed::quick`](super::bed::Bed::quick).
+    /// `Bed::quick`.
     pub quick: &'a [Row],
     pub force: &'a mut [Four],
     pub torque: &'a mut [Four],
