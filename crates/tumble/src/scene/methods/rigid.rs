@@ -130,7 +130,7 @@ impl MethodRules for Rules {
                 Ok(made) => {
                     let first = bodies.rows.len();
                     bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
-                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), made.hull.reach));
+                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), made.hull.reach, made.volume));
                     bodies.hulls.push(made.hull);
                     bodies.rows.extend(made.bodies);
                     objects.push(Object { name: thing.name.clone(), rows: first..bodies.rows.len(), mesh: made.mesh });
@@ -141,8 +141,8 @@ impl MethodRules for Rules {
         bodies.moving = bodies.rows.len();
         if touches(scene) {
             let rows = builder.exchange.open(builder.ids[index], 0..bodies.moving, true);
-            for (range, solid, reach) in solids {
-                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach });
+            for (range, solid, reach, volume) in solids {
+                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach, volume });
             }
         }
         for solid in builder.colliders.iter() {
