@@ -225,7 +225,7 @@ fn gains(shape: Shape, reach: f64, state: BodyState) -> [[Vector; 2]; 3] {
     }
     solids.bodies[0].tell(&mut exchange.turn(own));
     let got = exchange.turn(other).take()[0];
-    [[after[0] - before[0], after[1] - before[1]], [got.impulse, got.moment], [walls, about]]
+    [[after[0] - before[0], after[1] - before[1]], [got.impulse, state.position.cross(got.impulse) + got.moment], [walls, about]]
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn a_body_feels_the_density_of_the_warm_fluid_around_it() {
             let words = format!("temperature = {{ ambient = 300, initial = \"375\" }}\ndensities = \"{densities}\"\nbodies =");
             text.replace("bodies =", &words)
         };
-        let mut fall = |ratio: f64| {
+        let fall = |ratio: f64| {
             let mut sim = simulation(&warm(tank(20, "sphere = { radius = 0.25 }", ratio, "", ONCE)));
             step(&mut sim);
             column(&sim, "body", "velocity")[0].z / 9.8e-3

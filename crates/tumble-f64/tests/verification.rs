@@ -7,6 +7,7 @@
 
 mod common;
 
+mod afloat;
 mod animated;
 mod arranged;
 mod bending;

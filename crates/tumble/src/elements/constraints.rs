@@ -1,8 +1,6 @@
-//! Elements that a position-based method satisfies one after the other: Gauss-Seidel over colours, elements of one colour side by side,
-//! since no two of them share a node. Threads first take clusters, elements between rows that are near each other in memory, and go
-//! through all colours of one without waiting for others; elements between clusters follow, colour by colour. The order of elements is
-//! fixed, and so are the bits, whatever the threads and registers.
-//!
+//! Elements that a position-based method satisfies one after the other: Gauss-Seidel over colours, elements of one colour, which share no node, side
+//! by side. Threads first take clusters, elements between rows that are near in memory, and go through all colours of one without waiting for others;
+//! elements between clusters follow, colour by colour. The order of elements is fixed, and so are the bits, whatever the threads and registers.
 //! Source: [bender2015], section 5; [macklin2016]. Verified in `tests/position_based.rs`.
 
 use super::list::Members;
@@ -22,7 +20,7 @@ mod shape;
 mod strands;
 mod volume;
 
-pub use density::{Density, behind, spline};
+pub use density::{Density, Frozen, Samples, behind, spline};
 pub use neohookean::Neohookean;
 pub use shape::{HELD, Shape};
 pub use strands::Strands;
@@ -78,6 +76,8 @@ pub trait Constraints: Send + Sync {
     fn liquid(&self) -> Option<&Density> {
         None
     }
+    /// Puts bodies into the liquid that they are, if they are one.
+    fn immerse(&mut self, _put: &mut dyn FnMut(&mut Density)) {}
     /// Of elements that drive: the energy that they may bring the masses [J].
     fn drives(&self) -> Option<f64> {
         None

@@ -29,7 +29,9 @@ mod woven;
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Incidence};
 pub use bend::Bending;
-pub use constraints::{Constraints, Density, HELD, Neohookean, Projected, Projection, Shape, Strands, Volume, behind, enclosed, spline};
+pub use constraints::{
+    Constraints, Density, Frozen, HELD, Neohookean, Projected, Projection, Samples, Shape, Strands, Volume, behind, enclosed, spline,
+};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
 pub use driven::{Driven, DrivenSpring};

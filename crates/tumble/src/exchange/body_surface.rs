@@ -14,6 +14,8 @@ pub struct BodySurface {
     pub solid: Arc<Collider>,
     /// Greatest distance of the surface from the centre of mass [m].
     pub reach: f64,
+    /// The volume within [m³].
+    pub volume: f64,
 }
 
 impl PartialEq for BodySurface {

@@ -36,7 +36,7 @@ pub enum When {
     Steady,
     /// Like a steady one, with the displacement that it has given to the visitor's copy.                   (coupling.9)
     Timed,
-    /// Like a steady one, through the centre of mass wherever that goes, as of a field: its moment about the origin is not told.
+    /// Like a steady one, through the centre of mass wherever that goes, and a couple.
     Central,
 }
 
@@ -380,9 +380,9 @@ impl Turn<'_> {
         self.send((to, When::Steady), Wrench { impulse, moment, ..Wrench::default() });
     }
 
-    /// The same of a force through the centre of mass of the row, wherever that goes: that of a field.
-    pub fn post_central(&mut self, to: BodyRow, impulse: Vector) {
-        self.send((to, When::Central), Wrench { impulse, ..Wrench::default() });
+    /// The same of a force through the centre of mass of the row, wherever that goes, and a couple [N m s]: that of what is all around it.
+    pub fn post_central(&mut self, to: BodyRow, impulse: Vector, couple: Vector) {
+        self.send((to, When::Central), Wrench { impulse, moment: couple, ..Wrench::default() });
     }
 
     /// The same as a sum, with the time integrals of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted, from which

@@ -69,6 +69,28 @@ impl Visit {
         }
     }
 
+    /// Whether it stays where it is, as something bears it.
+    pub fn stands(&self) -> bool {
+        self.state.borne && self.state.normal != Vector::default()
+    }
+
+    /// Takes an impulse, its moment about the origin, and that about the centre, of what pushes from all around.
+    pub fn take_all(&mut self, impulse: Vector, moment: Vector, angular: Vector) {
+        if !self.stands() {
+            self.state.velocity = self.state.velocity + impulse * self.state.inverse_mass;
+            self.state.spin = self.state.spin + self.state.turned(angular);
+        }
+        (self.impulse, self.moment, self.angular) = (self.impulse + impulse, self.moment + moment, self.angular + angular);
+    }
+
+    /// Where it will be in h [s], if nothing touches it.
+    pub fn ahead(&self, h: f64) -> BodyState {
+        let mut copy = self.clone();
+        copy.accelerate(h);
+        copy.advance(h);
+        copy.state
+    }
+
     /// Change of the velocity of its point by an impulse e there [m/s].
     pub fn yields_to(&self, point: Vector, e: Vector, normal: Vector) -> Vector {
         let (velocity, spin) = self.response(point, e, normal);

@@ -85,26 +85,22 @@ pub struct Immersed {
     pub state: BodyState,
     /// How it yields to impulses, in this interval; not at all before the first.
     response: Response,
-    /// Impulse of the pressure in this interval [N s], and its moment about the origin [N m s]; impulse of the buoyancy.
-    impulse: Vector,
-    moment: Vector,
-    buoyancy: Vector,
+    /// Impulse from the fluid in this interval [N s], and angular impulse about the centre of mass [N m s].
+    wrench: Directions,
     /// Cells beside it, with its closed shares of their faces along each axis, and the moments of those [m].
     cells: Vec<(u32, [Real; DIRECTIONS])>,
 }
 
-/// What of a body a half step goes on from: velocity and spin, impulse and moment, and buoyancy.
+/// What of a body a half step goes on from: velocity and spin, and what it has got.
 pub struct Before {
     twist: Directions,
     wrench: Directions,
-    buoyancy: Vector,
 }
 
 impl Immersed {
     /// A body in this state.
     pub fn new(row: BodyRow, hull: Hull, state: BodyState) -> Self {
-        let zero = Vector::default();
-        Self { row, hull, state, response: Response::default(), impulse: zero, moment: zero, buoyancy: zero, cells: Vec::new() }
+        Self { row, hull, state, response: Response::default(), wrench: Default::default(), cells: Vec::new() }
     }
 
     /// The object that it belongs to.
@@ -183,13 +179,13 @@ impl Immersed {
             }
         }
         // A step that was cut short may have left some.
-        (self.impulse, self.moment, self.buoyancy) = Default::default();
+        self.wrench = Default::default();
     }
 
     /// Gives its system what the fluid has given it.
     pub fn tell(&mut self, exchange: &mut Turn<'_>) {
-        exchange.post_sum(self.row, std::mem::take(&mut self.impulse), std::mem::take(&mut self.moment));
-        exchange.post_central(self.row, std::mem::take(&mut self.buoyancy));
+        let [impulse, couple] = parted(std::mem::take(&mut self.wrench));
+        exchange.post_central(self.row, impulse, couple);
     }
 
     /// Changes velocity and spin by an impulse and an angular impulse about its centre.
@@ -199,9 +195,7 @@ impl Immersed {
     }
 
     fn push(&mut self, wrench: Directions) {
-        let [impulse, angular] = parted(wrench);
-        self.impulse = self.impulse + impulse;
-        self.moment = self.moment + self.state.position.cross(impulse) + angular;
+        self.wrench.iter_mut().zip(wrench).for_each(|(sum, part)| *sum += part);
         self.yield_by(wrench);
     }
 
@@ -211,9 +205,8 @@ impl Immersed {
         if inverse_mass == 0.0 {
             return;
         }
-        let buoyancy = Vector::from(gravity) * (-h * density * self.displaced(grid));
-        self.buoyancy = self.buoyancy + buoyancy;
-        self.yield_by(joined(acceleration * (h / inverse_mass) + buoyancy, Vector::default()));
+        self.yield_by(joined(acceleration * (h / inverse_mass), Vector::default()));
+        self.push(joined(Vector::from(gravity) * (-h * density * self.displaced(grid)), Vector::default()));
     }
 
     /// Moves for h seconds.
@@ -227,16 +220,15 @@ impl Immersed {
 
     /// What a half step goes on from.
     pub fn before(&self) -> Before {
-        Before { twist: joined(self.state.velocity, self.state.spin), wrench: joined(self.impulse, self.moment), buoyancy: self.buoyancy }
+        Before { twist: joined(self.state.velocity, self.state.spin), wrench: self.wrench }
     }
 
     /// Goes on from there by twice what has changed since.                                             (gas.20)
     pub fn reflect(&mut self, before: &Before) {
         let now = self.before();
-        let twice = |now: Directions, before: Directions| parted(std::array::from_fn(|k| 2.0 * now[k] - before[k]));
-        [self.state.velocity, self.state.spin] = twice(now.twist, before.twist);
-        [self.impulse, self.moment] = twice(now.wrench, before.wrench);
-        self.buoyancy = self.buoyancy * 2.0 - before.buoyancy;
+        let twice = |now: Directions, before: Directions| -> Directions { std::array::from_fn(|k| 2.0 * now[k] - before[k]) };
+        [self.state.velocity, self.state.spin] = parted(twice(now.twist, before.twist));
+        self.wrench = twice(now.wrench, before.wrench);
     }
 
     /// Forgets the cells beside it.

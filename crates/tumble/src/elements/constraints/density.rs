@@ -8,6 +8,10 @@
 //! Source: [macklin2013]. Differs: compliance instead of a mixture of forces, masses in the weights, no tensile term; viscosity is a force.
 //! Verified in `tests/liquids.rs`.
 
+mod frozen;
+
+pub use frozen::{Frozen, Samples};
+
 use super::{Constraints, Projection};
 use crate::geometry::{Meet, Neighbours, Vector, Walls};
 use crate::math::parallel::{chunks, chunks2, fold, sum};
@@ -63,6 +67,21 @@ pub struct Density {
     pushes: Vec<Vector>,
     /// Whether walls have pushed in this sub-step.
     leans: bool,
+    /// Rigid bodies in it, which sweeps move as well.
+    pub bodies: Vec<Frozen>,
+    touches: Vec<Touch>,
+}
+
+/// A body near a particle.
+#[derive(Debug, Clone, Copy)]
+struct Touch {
+    particle: usize,
+    body: usize,
+    /// Its share of the density, and s times the gradient of that.
+    part: f64,
+    slope: Vector,
+    /// By how much it yields to a push along the slope, the square root [1/sqrt(kg)].
+    size: f64,
 }
 
 /// No solid is near.
@@ -130,7 +149,14 @@ impl Density {
             near: Vec::new(),
             pushes: Vec::new(),
             leans: false,
+            bodies: Vec::new(),
+            touches: Vec::new(),
         }
+    }
+
+    /// The distance of its particles at rest [m].
+    pub fn spacing(&self) -> f64 {
+        self.spacing
     }
 
     /// Its rows.
@@ -183,6 +209,50 @@ impl Density {
                 *against = [1.0 - free, slope.x, slope.y, slope.z, stiff * f64::from(x[3])].map(|c| c as Real);
             }
         });
+    }
+
+    /// Adds the share of bodies, and how they yield to all multipliers near them together: that keeps the sweep from overshooting, as all act
+    /// at once.                                                                                              (liquids.11)
+    fn add_bodies(&self, x: &[Row], near: &mut [u32], against: &mut [[Real; 5]]) -> Vec<Touch> {
+        if self.bodies.is_empty() {
+            return Vec::new();
+        }
+        let of = |range: Range<usize>| {
+            let mut found = Vec::new();
+            for particle in range {
+                let at = xyz64(x[particle]);
+                for (body, frozen) in self.bodies.iter().enumerate() {
+                    if let Some((part, slope)) = frozen.near(at) {
+                        found.push(Touch { particle, body, part, slope, size: frozen.yields(at, slope).sqrt() });
+                    }
+                }
+            }
+            found
+        };
+        let touches = fold(x.len(), of).concat();
+        let mut sizes = vec![0.0; self.bodies.len()];
+        touches.iter().for_each(|touch| sizes[touch.body] += touch.size);
+        for Touch { particle, body, part, slope, size } in &touches {
+            let more = [*part, slope.x, slope.y, slope.z, size * sizes[*body]];
+            against[*particle].iter_mut().zip(more).for_each(|(sum, more)| *sum += more as Real);
+            // What walls take of it is found without the bodies.
+            let near = &mut near[*particle];
+            *near = if *near == NONE { NONE } else { SEVERAL };
+        }
+        touches
+    }
+
+    /// Gives bodies what this sweep's multipliers push them, in a sub-step of length h [s] that began at `before`.          (liquids.11)
+    fn push_bodies(&mut self, x: &[Row], before: &[Row], h: f64) {
+        let Self { bodies, touches, delta, spacing, .. } = self;
+        for (body, frozen) in bodies.iter_mut().enumerate() {
+            let own = touches.iter().filter(|touch| touch.body == body && delta[touch.particle] != 0.0);
+            let push = |touch: &Touch| {
+                let [now, start] = [x, before].map(|rows| xyz64(rows[touch.particle]));
+                (now, start, touch.slope * (-f64::from(delta[touch.particle]) * *spacing / h))
+            };
+            frozen.take(own.map(push), h);
+        }
     }
 
     /// Adds what this sweep's multipliers push the solids, in a sub-step of length h [s].                    (liquids.8)
@@ -240,6 +310,10 @@ impl Constraints for Density {
         Some(self)
     }
 
+    fn immerse(&mut self, put: &mut dyn FnMut(&mut Density)) {
+        put(self);
+    }
+
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
@@ -260,6 +334,7 @@ impl Constraints for Density {
         self.gather(&mut grid, rows, &mut points, &mut sums);
         self.add_walls(rows, step.walls, &mut near, &mut against);
         self.leans = (step.iteration > 0 && self.leans) || against.iter().any(|a| a[0] > 0.0);
+        self.touches = self.add_bodies(rows, &mut near, &mut against);
         (self.grid, self.points, self.sums, self.near, self.against) = (grid, points, sums, near, against);
         if step.iteration == 0 || self.lambda.len() != rows.len() {
             self.lambda.clear();
@@ -294,6 +369,9 @@ impl Constraints for Density {
         }
         if self.leans {
             self.add_pushes(rows, step.walls, step.h);
+        }
+        if !self.touches.is_empty() {
+            self.push_bodies(rows, &step.before[self.rows.clone()], step.h);
         }
         let (own, delta) = (&*rows, &self.delta);
         self.grid.sorted(|i| [own[i][0], own[i][1], own[i][2], delta[i]], &mut self.pushed);

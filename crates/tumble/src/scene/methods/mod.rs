@@ -215,11 +215,10 @@ pub fn touches(scene: &Scene) -> bool {
     !scene.body.is_empty() && scene.objects().iter().any(|o| visits_bodies(scene, o))
 }
 
-/// Whether an object consists of masses or grains that touch rigid bodies. Contact alone would carry a body wrongly in a liquid.
+/// Whether an object consists of masses or grains that touch rigid bodies.
 pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
-    let dry = || !scene.particles.iter().any(|thing| thing.name == object.name && thing.fluid.is_some());
-    mover == Some(Method::Grains) || mover == Some(Method::Dynamics) && dry()
+    matches!(mover, Some(Method::Grains | Method::Dynamics))
 }
 
 /// Whether a fluid moves rigid bodies.

@@ -128,7 +128,8 @@ impl MethodRules for Rules {
                     let (hull, left) = made.hull();
                     builder.warnings.extend(left.map(|left| coarse(thing, left)));
                     bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
-                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), hull.reach));
+                    let (rows, volume) = (first..first + made.bodies.len(), made.volume());
+                    solids.push((rows, Arc::new(made.solid), hull.reach, volume));
                     bodies.hulls.push(hull);
                     bodies.rows.extend(made.bodies);
                     objects.push(Object { name: thing.name.clone(), rows: first..bodies.rows.len(), mesh: made.mesh });
@@ -139,8 +140,8 @@ impl MethodRules for Rules {
         bodies.moving = bodies.rows.len();
         if touches(scene) {
             let rows = builder.exchange.open(builder.ids[index], 0..bodies.moving, true);
-            for (range, solid, reach) in solids {
-                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach });
+            for (range, solid, reach, volume) in solids {
+                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach, volume });
             }
         }
         for solid in builder.colliders.iter() {

@@ -291,8 +291,10 @@ impl Dynamics {
             self.witness(step.t);
             self.apply_anchors(step, exchange);
             self.features.before(&mut self.core, step);
+            self.reaction.immerse(&mut self.core, h);
             let taken = self.scheme.step(&mut self.core, &mut self.features, step, &mut report);
             taken.map_err(|e| e.in_system(&self.core.name))?;
+            self.reaction.emerge(&self.core);
             report.stepped(h);
             self.finish(step, &mut report);
             self.core.insert_births(births, if k + 1 == substeps { end } else { step.end() }, h, end)?;

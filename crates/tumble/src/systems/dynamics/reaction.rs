@@ -7,9 +7,9 @@
 //! a solid gives, and friction is held within its cone.
 
 use super::contact::{Found, Pass, Step};
-use super::core::{Core, without};
+use super::core::Core;
 use super::feature::Span;
-use crate::elements::Density;
+use crate::elements::{Density, Frozen, Samples};
 use crate::exchange::{BodyRow, BodyState, Exchange, Turn, Visit};
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Friction, Motion, Vector};
@@ -17,6 +17,7 @@ use crate::math::parallel::fold;
 use crate::math::{Real, Row, xyz64};
 use crate::pool::Hit;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The part of their depth by which masses that are held move a body out of themselves in a sub-step.
 const PART: f64 = 0.2;
@@ -34,6 +35,9 @@ struct Visited {
 pub struct Reaction {
     solids: Vec<Collider>,
     bodies: Vec<Visited>,
+    /// Volume of each surface [m³], and its samples for each liquid.
+    volumes: Vec<f64>,
+    samples: Vec<Vec<Option<Arc<Samples>>>>,
     /// Masses that do not touch a body because an anchor ties them to it, in order.
     tied: Vec<(usize, usize)>,
 }
@@ -83,6 +87,8 @@ impl Reaction {
             let still = Key { time: 0.0, shift: Vector::default(), turn: BodyState::default().orientation };
             let zero = Vector::default();
             let motion = || Motion { velocity: zero, spin: zero, pivot: zero, keys: vec![still], smooth: false };
+            self.volumes = surfaces.iter().map(|surface| surface.volume).collect();
+            self.samples.clear();
             self.solids = surfaces.iter().map(|surface| Collider { motion: Some(motion()), ..(*surface.solid).clone() }).collect();
         }
         self.bodies.clear();
@@ -105,6 +111,45 @@ impl Reaction {
     /// The largest speed of a point of a body [m/s].
     pub fn fastest(&self) -> f64 {
         self.bodies.iter().map(|visited| visited.body.fastest()).fold(0.0, f64::max)
+    }
+
+    /// Puts bodies into liquids, where a sub-step of h seconds would take them: its sweeps move both.                (liquids.11)
+    pub fn immerse(&mut self, core: &mut Core, h: f64) {
+        if self.bodies.is_empty() {
+            return;
+        }
+        let Self { solids, bodies, volumes, samples, .. } = self;
+        let mut k = 0;
+        let mut put = |liquid: &mut Density| {
+            if samples.len() == k {
+                let one = |(solid, volume): (&Collider, &f64)| Samples::new(&solid.shape, *volume, liquid.spacing()).map(Arc::new);
+                samples.push(solids.iter().zip(volumes.iter()).map(one).collect());
+            }
+            let frozen = |(owner, Visited { body, solid }): (usize, &Visited)| {
+                let samples = samples[k][*solid].clone()?;
+                let BodyState { position, orientation, mut inverse_mass, mut inverse_inertia, .. } = body.ahead(h);
+                if body.stands() {
+                    (inverse_mass, inverse_inertia) = Default::default();
+                }
+                let zero = Vector::default();
+                let got = [zero; 3];
+                Some(Frozen { samples, owner, position, orientation, inverse_mass, inverse_inertia, got })
+            };
+            liquid.bodies.clear();
+            liquid.bodies.extend(bodies.iter().enumerate().filter_map(frozen));
+            k += 1;
+        };
+        core.constraints.iter_mut().for_each(|c| c.immerse(&mut put));
+    }
+
+    /// Gives bodies what liquids have pushed them in the sweeps.
+    pub fn emerge(&mut self, core: &Core) {
+        for frozen in core.liquids().flat_map(|liquid| &liquid.bodies) {
+            let [impulse, moment, angular] = frozen.got;
+            if let Some(visited) = self.bodies.get_mut(frozen.owner).filter(|_| impulse != Vector::default()) {
+                visited.body.take_all(impulse, moment, angular);
+            }
+        }
     }
 
     /// The contact pass of a sub-step: masses that touch a body, in the order of their rows.
@@ -163,9 +208,7 @@ impl Reaction {
             found.sort_unstable();
             found
         };
-        // In a liquid contact alone would carry bodies wrongly.
-        let liquids: Vec<Range<usize>> = core.liquids().map(Density::rows).collect();
-        let all = laws.masses.points().flat_map(|points| without(points, &liquids)).map(|points| {
+        let all = laws.masses.points().map(|points| {
             let here = |range: Range<usize>| {
                 let rows = range.map(|i| points.start + i).filter(|i| laws.masses.mass[*i] > 0.0);
                 rows.flat_map(of).collect::<Vec<_>>()

@@ -71,6 +71,18 @@ impl FreeBodies {
         }
     }
 
+    /// Takes off what liquids have given to rigid bodies in the sweeps.
+    pub fn add_reactions(&mut self, core: &Core) {
+        for liquid in core.liquids().filter(|liquid| !liquid.bodies.is_empty()) {
+            let start = liquid.rows().start;
+            let Some(body) = self.bodies.iter_mut().find(|body| body.points.iter().any(|range| range.contains(&start))) else { continue };
+            for frozen in &liquid.bodies {
+                let [impulse, moment, _] = frozen.got;
+                body.target = [body.target[0] - impulse, body.target[1] - moment];
+            }
+        }
+    }
+
     /// Gives every body the momenta that it is to have; none to those that solids have pushed in a sweep.
     pub fn restore(&self, core: &mut Core) {
         let leaning: Vec<usize> = core.constraints.iter().filter_map(|c| c.leans()).collect();

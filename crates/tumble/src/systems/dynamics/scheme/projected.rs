@@ -167,6 +167,7 @@ impl Scheme for Projected {
         features.moved(core, step);
         self.sweep(core, features, step, report);
         set_velocities(core, step.h as Real);
+        self.free_bodies.add_reactions(core);
         self.free_bodies.restore(core);
         core.memory.ready = true;
         Ok(())
