@@ -127,7 +127,9 @@ def test_rigid_bodies_in_a_gas_are_no_smaller_than_its_cells_and_come_after_it()
         "gas": [{"name": "air", "box": {"size": [1, 1, 1], "resolution": 20}, "bodies": ["plate"]}],
         "body": [{"name": "plate", "shape": {"box": {"size": [0.1, 0.1, 0.01]}}, "position": [[0, 0, 0]]}],
     }
-    with pytest.raises(SceneError, match='body of "plate" has a radius of 0.0709.* m, expected >= 1.5 cells = 0.075 m'):
+    with pytest.raises(
+        SceneError, match=r'body of "plate" has a radius of 0.0709.* m, expected >= 1.5 cells = 0.075 m'
+    ):
         World(scene)
     scene["body"][0]["shape"]["box"]["size"] = [0.3, 0.3, 0.01]
     assert not any(warning["code"] == "unfelt" for warning in World(scene).warnings)
