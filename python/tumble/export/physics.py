@@ -125,7 +125,7 @@ def _body(stage: Any, prim: Any, run: Recording, part: Part, words: Mapping[str,
     weight.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
     if words.get("inertia"):
         weight.CreateDiagonalInertiaAttr(Gf.Vec3f(*map(float, words["inertia"])))
-    shape = next(iter(words["shape"]))
+    shape = next(iter(words.get("shape", ())), "")
     _collides(stage, prim, SHAPES.get(shape, "convexHull"), words)
 
 

@@ -19,7 +19,7 @@ use crate::system::System;
 use crate::systems::gas::{Fire, Fluid, Gas, Settings, Source};
 use crate::systems::rigid;
 use std::sync::Arc;
-use tumble_interface::check::{plain, suggestion};
+use tumble_interface::check::{plain, short, suggestion};
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
     Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method,
@@ -347,8 +347,8 @@ impl Read<'_, '_> {
                 let message = format!(
                     "a body of \"{}\" has a radius of {} m, expected >= {LEAST_RADIUS} cells = {} m; raise box.resolution or the radius",
                     body.name(),
-                    plain(radius),
-                    plain(least)
+                    short(radius),
+                    short(least)
                 );
                 self.wrong(".bodies", message);
             }
