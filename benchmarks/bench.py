@@ -35,6 +35,7 @@ CASES = [
     "gravitation",
     "flock",
     "grains",
+    "rigid",
     "hair",
     "cloth",
     "contact",
@@ -57,6 +58,7 @@ TARGETS = {
     ("flock", "numba"): (4.0, "at least"),
     ("flock", "taichi"): (4.0, "at least"),
     ("grains", "lammps"): (3.4, "at least"),
+    **{(f"pile of {n}", "rapier"): (1.05, "at most") for n in (1015, 4900)},
     **{(f"pressure {n}, {kind}", "pyamg"): (40.0, "at least") for n in (128, 256) for kind in ("random", "plume")},
     **{
         (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")

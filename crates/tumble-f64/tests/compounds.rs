@@ -13,7 +13,7 @@ use tumble_interface::{Assets, Data, Engine, Mesh, Scene};
 fn ring(n: u32, [inner, outer]: [f64; 2], h: f64) -> Mesh {
     let corner = |k: u32| {
         let (angle, r) = (TAU * f64::from(k / 4) / f64::from(n), if k % 4 < 2 { outer } else { inner });
-        [r * angle.cos(), r * angle.sin(), if k % 2 == 0 { -0.5 * h } else { 0.5 * h }]
+        [r * angle.cos(), r * angle.sin(), if k.is_multiple_of(2) { -0.5 * h } else { 0.5 * h }]
     };
     // Outer bottom, outer top, inner bottom, inner top of each corner.
     let quads = (0..n).flat_map(|i| {
