@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { after, before, describe, it } from "node:test";
 import { gzipSync } from "node:zlib";
 import type { BrowserContext, Page } from "playwright-core";
-import { frame, type Lab, lab, ready, SCENES, STILL, serious, shipped, tried } from "./browser.ts";
+import { frame, type Lab, lab, ready, SCENES, STILL, serious, shipped, tried, WHOLE } from "./browser.ts";
 
 const ids = shipped();
 
@@ -134,7 +134,7 @@ describe("gallery", () => {
     await context.close();
   });
 
-  it("shows the first picture of a scene after less than 3.4 MB, with nothing in the cache", async () => {
+  it("shows the first picture of a scene after some 3 MB, with nothing in the cache", async () => {
     const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
     const page = await context.newPage();
     const sizes: Promise<number>[] = [];
@@ -153,8 +153,8 @@ describe("gallery", () => {
     assert.deepEqual([...used], ["single"]);
     const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
     console.log(`# first picture after ${(bytes / 1e6).toFixed(2)} MB gzipped`);
-    // With the engine, which is above 1 MB, 0.2 MB of them the shapes of rigid bodies; that of tests is larger than the one that ships.
-    assert.ok(bytes > 1e6 && bytes < 3.4e6, `${bytes} bytes`);
+    // With the engine, which is above 1 MB, 0.2 MB of them the shapes of rigid bodies; `make validate` has the one that ships, others are larger.
+    assert.ok(bytes > 1e6 && bytes < (WHOLE ? 3.4e6 : 3.6e6), `${bytes} bytes`);
     await context.close();
   });
 });

@@ -112,8 +112,8 @@ pub enum GrainClump {
     Dumbbell,
     /// Four spheres that touch each other.
     Tetrahedron,
-    /// These spheres, of one density; where they overlap, matter counts once.
-    Spheres(Vec<[f64; 4]>),
+    /// These spheres, each x, y, z and radius over the `radius` of the grains, of one density; where they overlap, matter counts once.
+    Spheres(#[schemars(extend("x-unit" = "1"))] Vec<[f64; 4]>),
 }
 
 impl GrainClump {
