@@ -31,13 +31,14 @@ fn main() {
     let parameters = IntegrationParameters { dt: step, ..Default::default() };
     let (mut pipeline, mut islands) = (PhysicsPipeline::new(), IslandManager::new());
     let (mut broad, mut narrow) = (DefaultBroadPhase::new(), NarrowPhase::new());
-    let (mut joints, mut multibodies, mut ccd) = (ImpulseJointSet::new(), MultibodyJointSet::new(), CCDSolver::new());
+    let (mut joints, mut multibodies) = (ImpulseJointSet::new(), MultibodyJointSet::new());
+    let (mut soft, mut ccd) = (SoftBodySet::new(), CCDSolver::new());
     let mut times = Vec::new();
     for k in 0..(settle + steps) as usize {
         let start = Instant::now();
         pipeline.step(
             Vector::new(0.0, 0.0, -9.81), &parameters, &mut islands, &mut broad, &mut narrow, &mut bodies, &mut colliders,
-            &mut joints, &mut multibodies, &mut ccd, &(), &(),
+            &mut joints, &mut multibodies, &mut soft, &mut ccd, &(), &(),
         );
         if k >= settle as usize {
             times.push(start.elapsed().as_secs_f64());
