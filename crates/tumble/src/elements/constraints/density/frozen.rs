@@ -190,3 +190,29 @@ impl Frozen {
         self.orientation = (rotation::by(self.turned(angular) * h) * self.orientation).normalized();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_push_off_the_centre_moves_and_turns_a_body_within_the_sub_step() {
+        let box_ = Shape::Box { center: Vector::default(), half: [0.2, 0.1, 0.1].into(), turn: rotation::from_degrees([0.0; 3]) };
+        let mut body = Frozen {
+            samples: Arc::new(Samples::new(&box_, 0.016, 0.05).unwrap()),
+            owner: 0,
+            position: [1.0, 0.0, 0.0].into(),
+            orientation: rotation::from_degrees([0.0; 3]),
+            inverse_mass: 0.5,
+            inverse_inertia: [2.0, 4.0, 5.0, 0.0, 0.0, 0.0],
+            got: [Vector::default(); 3],
+        };
+        // r x p = (0.2, 0, 0) x (0, 0.03, 0) = (0, 0, 0.006), which turns it by 5 * 0.006 * h about z.
+        let (x, before, push, h) = (Vector::from([1.2, 0.0, 0.0]), Vector::from([1.1, 0.0, 0.0]), Vector::from([0.0, 0.03, 0.0]), 0.1);
+        body.take([(x, before, push)].into_iter(), h);
+        let turned = body.orientation.turn([1.0, 0.0, 0.0].into());
+        assert!((body.position - Vector::from([1.0, 0.0015, 0.0])).norm() < 1e-15, "{:?}", body.position);
+        assert!((turned.y - 0.003).abs() < 1e-8 && turned.z.abs() < 1e-15, "{turned:?}");
+        assert!((body.got[2].z - 0.006).abs() < 1e-15 && (body.got[1].z - 0.033).abs() < 1e-15, "{:?}", body.got);
+    }
+}
