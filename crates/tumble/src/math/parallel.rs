@@ -19,15 +19,21 @@ pub fn each(n: usize, f: &(dyn Fn(usize) + Sync)) {
     }
 }
 
+/// Tasks that threads may take. Like `take`, it does not depend on what is done with them, so that it is compiled once for all that is.
+fn list<I: Iterator>(tasks: I) -> Vec<Mutex<Option<I::Item>>> {
+    tasks.map(|task| Mutex::new(Some(task))).collect()
+}
+
+fn take<T>(task: &Mutex<Option<T>>) -> Option<T> {
+    task.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
 /// Tasks for all threads, coarse ones: each costs an entry of a list and a lock.
 pub trait Tasks: Iterator<Item: Send> + Sized {
     /// Calls `f` for each.
     fn in_parallel(self, f: impl Fn(Self::Item) + Sync) {
-        let tasks: Vec<_> = self.map(|task| Mutex::new(Some(task))).collect();
-        each(tasks.len(), &|i| {
-            let task = tasks[i].lock().unwrap_or_else(PoisonError::into_inner).take();
-            task.into_iter().for_each(&f);
-        });
+        let tasks = list(self);
+        each(tasks.len(), &|i| take(&tasks[i]).into_iter().for_each(&f));
     }
 
     /// Results of `f` for each, in order.

@@ -3,7 +3,7 @@
 use super::body::Body;
 use crate::geometry::{Friction, Vector};
 use crate::math::Quat;
-use crate::math::parallel::fold;
+use crate::math::parallel::{Tasks, fold};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rotation, Vector as V};
 use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test};
@@ -13,6 +13,15 @@ use parry3d_f64::shape::SharedShape;
 const CLOSE: f64 = 1e-3;
 /// A contact that has moved less than this over the reach of a body is the same one.
 const NEAR: f64 = 0.1;
+
+/// A pair keeps its points while it moves and turns less than this against how it was found, over the reach of the smaller body.
+const STILL: f64 = 1e-4;
+/// Bounds are let out by this multiple of the margin of a sub-step, so that pairs hold for several.
+const ROOM: f64 = 4.0;
+/// Points are looked for within this multiple of the distance that matters.
+const SIGHT: f64 = 1.5;
+/// Pairs per task.
+const PAIRS: usize = 256;
 
 /// Numbers of a contact in a snapshot.
 pub const CONTACT: usize = 20;
@@ -145,6 +154,100 @@ fn vector(v: V) -> Vector {
     Vector { x: v.x, y: v.y, z: v.z }
 }
 
+/// What is known of pairs from before in an interval.
+#[derive(Default)]
+pub struct Near {
+    /// Of each body: its room [m], and where it was.
+    rooms: Vec<(f64, Vector, Quat<f64>)>,
+    /// Pairs whose bounds overlap when each is let out by its room, in order.
+    seen: Vec<Seen>,
+}
+
+/// Points of a pair, as they were found.
+struct Seen {
+    pair: [u32; 2],
+    /// Pose of the second in the axes of the first.
+    between: (Vector, Quat<f64>),
+    /// Points that are closer than this have been found [m]; negative if none have been looked for.
+    within: f64,
+    points: Vec<Mark>,
+}
+
+/// A point of a pair, in the axes of each body.
+#[derive(Clone, Copy)]
+struct Mark {
+    on: [Vector; 2],
+    /// The normal, in the axes of the second body if that is a solid, otherwise of the first.
+    normal: Vector,
+}
+
+impl Bodies {
+    /// Displacement of the surface of a body from a pose, at most [m].
+    fn moved(&self, i: usize, x: Vector, q: Quat<f64>) -> f64 {
+        (self.rows[i].x - x).norm() + self.hull(i).reach * angle(q.conj() * self.rows[i].q)
+    }
+
+    /// Pose of the second body of a pair in the axes of the first.
+    fn between(&self, [i, j]: [u32; 2]) -> (Vector, Quat<f64>) {
+        let [a, b] = [i, j].map(|i| &self.rows[i as usize]);
+        (a.q.conj().turn(b.x - a.x), a.q.conj() * b.q)
+    }
+}
+
+/// An angle that is not less than that of a turn, nearly it if it is small [rad].
+fn angle(q: Quat<f64>) -> f64 {
+    std::f64::consts::PI * q.v.norm()
+}
+
+impl Near {
+    /// All contacts that may close within h [s], in the order of their pairs, but for pairs that stay apart. Pairs that have hardly moved against
+    /// each other since they were looked at in this interval keep their points: which ones does not depend on other bodies.
+    pub fn contacts(&mut self, bodies: &Bodies, h: f64, apart: &[[u32; 2]]) -> Vec<Contact> {
+        let margins: Vec<f64> = (0..bodies.rows.len()).map(|i| margin(bodies, i, h)).collect();
+        self.gather(bodies, &margins, apart);
+        let found = self.seen.chunks_mut(PAIRS).map_in_parallel(|pairs| {
+            let mut contacts = Vec::new();
+            for seen in pairs {
+                let [i, j] = seen.pair.map(|i| i as usize);
+                let within = margins[i] + margins[j];
+                if seen.within < within || !seen.still(bodies) {
+                    *seen = look(bodies, seen.pair, SIGHT * within);
+                }
+                seen.contacts(bodies, within, &mut contacts);
+            }
+            contacts
+        });
+        found.concat()
+    }
+
+    /// Finds pairs anew if a body may have met others than those that are known.
+    fn gather(&mut self, bodies: &Bodies, margins: &[f64], apart: &[[u32; 2]]) {
+        let n = bodies.rows.len();
+        let roomy = |(i, (room, x, q)): (usize, &(f64, Vector, Quat<f64>))| margins[i] + bodies.moved(i, *x, *q) <= *room;
+        if self.rooms.len() == n && self.rooms.iter().enumerate().all(roomy) {
+            return;
+        }
+        let room = |i: usize| (ROOM * margins[i], bodies.rows[i].x, bodies.rows[i].q);
+        self.rooms = (0..n).map(room).collect();
+        let mut pairs = pairs(bodies, &self.rooms.iter().map(|(room, ..)| *room).collect::<Vec<_>>());
+        pairs.retain(|pair| apart.binary_search(pair).is_err());
+        let mut before = std::mem::take(&mut self.seen).into_iter().peekable();
+        let seen = |pair| {
+            while before.next_if(|seen| seen.pair < pair).is_some() {}
+            let new = || Seen { pair, between: bodies.between(pair), within: -1.0, points: Vec::new() };
+            before.next_if(|seen| seen.pair == pair).unwrap_or_else(new)
+        };
+        self.seen = pairs.into_iter().map(seen).collect();
+    }
+}
+
+/// How far a body's bounds are let out for the next sub-step [m].
+fn margin(bodies: &Bodies, i: usize, h: f64) -> f64 {
+    let (body, hull) = (&bodies.rows[i], bodies.hull(i));
+    let close = if body.inverse_mass > 0.0 { CLOSE * hull.reach } else { 0.0 };
+    1.5 * h * (body.v.norm() + body.w.norm() * hull.reach) + hull.thickness + close
+}
+
 /// Pairs whose bounds overlap when each is let out by its margin [m], in order.
 fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
     let n = bodies.rows.len();
@@ -172,36 +275,66 @@ fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
     found
 }
 
-/// Points of contact of a pair that are closer than `within` [m].
-fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
+/// Points of a pair that are closer than `within` [m].
+fn look(bodies: &Bodies, pair: [u32; 2], within: f64) -> Seen {
     let [i, j] = pair.map(|i| i as usize);
     let ([a, b], [one, two], [first, second]) =
         ([&bodies.rows[i], &bodies.rows[j]], [bodies.hull(i), bodies.hull(j)], [bodies.pose(i), bodies.pose(j)]);
     let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
-    let (skin, between) = (one.thickness + two.thickness, first.inv_mul(&second));
+    let (skin, apart) = (one.thickness + two.thickness, first.inv_mul(&second));
     // Shapes that it cannot pair are refused when a scene is read.
-    let _ = DefaultQueryDispatcher.contact_manifolds(&between, &*one.shape.0, &*two.shape.0, within + skin, &mut manifolds, &mut None);
-    let friction =
-        Friction { sliding: one.friction.sliding.max(two.friction.sliding), resting: one.friction.resting.max(two.friction.resting) };
-    let belt = b.q.turn(two.belt) - a.q.turn(one.belt);
+    let _ = DefaultQueryDispatcher.contact_manifolds(&apart, &*one.shape.0, &*two.shape.0, within + skin, &mut manifolds, &mut None);
+    let mut points = Vec::new();
     for manifold in &manifolds {
         let part = manifold.subshape_pos1().map_or(first, |own| first * *own);
         let normal = vector(part.rotation * manifold.local_n1);
+        let owner = if b.inverse_mass == 0.0 { b } else { a };
         for point in manifold.contacts().iter().filter(|point| point.dist <= within + skin) {
             let on = vector(part * point.local_p1);
-            let at = on + normal * (0.5 * point.dist);
+            let on = [a.q.conj().turn(on - a.x), b.q.conj().turn(on + normal * point.dist - b.x)];
+            points.push(Mark { on, normal: owner.q.conj().turn(normal) });
+        }
+    }
+    Seen { pair, between: bodies.between(pair), within, points }
+}
+
+impl Seen {
+    /// Whether both bodies are where they were against each other.
+    fn still(&self, bodies: &Bodies) -> bool {
+        let [i, j] = self.pair.map(|i| i as usize);
+        let (x, q) = bodies.between(self.pair);
+        let reach = |i: usize| if bodies.rows[i].inverse_mass > 0.0 { bodies.hull(i).reach } else { f64::INFINITY };
+        let least = reach(i).min(reach(j));
+        (x - self.between.0).norm_sq() <= (STILL * least).powi(2) && angle(self.between.1.conj() * q) <= STILL
+    }
+
+    /// Its contacts that are closer than `within` [m].
+    fn contacts(&self, bodies: &Bodies, within: f64, out: &mut Vec<Contact>) {
+        let [i, j] = self.pair.map(|i| i as usize);
+        let ([a, b], [one, two]) = ([&bodies.rows[i], &bodies.rows[j]], [bodies.hull(i), bodies.hull(j)]);
+        let skin = one.thickness + two.thickness;
+        let larger = |of: fn(&Friction) -> f64| of(&one.friction).max(of(&two.friction));
+        let friction = Friction { sliding: larger(|f| f.sliding), resting: larger(|f| f.resting) };
+        let belt = b.q.turn(two.belt) - a.q.turn(one.belt);
+        // What nothing moves does not roll.
+        let arm = |hull: &Hull, body: &Body, arm: f64| if body.inverse_mass > 0.0 { hull.rolling * arm.abs() } else { 0.0 };
+        for mark in &self.points {
+            let normal = if b.inverse_mass == 0.0 { b.q.turn(mark.normal) } else { a.q.turn(mark.normal) };
+            let [p, q] = [a.x + a.q.turn(mark.on[0]), b.x + b.q.turn(mark.on[1])];
+            let distance = (q - p).dot(normal);
+            if distance > within + skin {
+                continue;
+            }
+            let at = p + normal * (0.5 * distance);
             let arms = [at - a.x, at - b.x];
-            // What nothing moves does not roll.
-            let arm =
-                |hull: &Hull, body: &Body, arm: Vector| if body.inverse_mass > 0.0 { hull.rolling * arm.dot(normal).abs() } else { 0.0 };
             out.push(Contact {
-                pair,
-                local: a.q.conj().turn(on - a.x),
+                pair: self.pair,
+                local: mark.on[0],
                 normal,
                 arms,
-                gap: point.dist - skin,
+                gap: distance - skin,
                 friction,
-                rolling: arm(one, a, arms[0]).max(arm(two, b, arms[1])),
+                rolling: arm(one, a, arms[0].dot(normal)).max(arm(two, b, arms[1].dot(normal))),
                 restitution: one.restitution.max(two.restitution),
                 belt: belt - normal * belt.dot(normal),
                 press: 0.0,
@@ -210,26 +343,6 @@ fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
             });
         }
     }
-}
-
-/// All contacts that may close within h [s], in the order of their pairs, but for pairs that stay apart.
-pub fn contacts(bodies: &Bodies, h: f64, apart: &[[u32; 2]]) -> Vec<Contact> {
-    let margin = |i: usize| {
-        let (body, hull) = (&bodies.rows[i], bodies.hull(i));
-        let close = if body.inverse_mass > 0.0 { CLOSE * hull.reach } else { 0.0 };
-        1.5 * h * (body.v.norm() + body.w.norm() * hull.reach) + hull.thickness + close
-    };
-    let margins: Vec<f64> = (0..bodies.rows.len()).map(margin).collect();
-    let mut pairs = pairs(bodies, &margins);
-    pairs.retain(|pair| apart.binary_search(pair).is_err());
-    let found = fold(pairs.len(), |range| {
-        let mut found = Vec::new();
-        for pair in &pairs[range] {
-            touch(bodies, *pair, pair.iter().map(|i| margins[*i as usize]).sum(), &mut found);
-        }
-        found
-    });
-    found.concat()
 }
 
 /// Takes over the impulses of the contacts before; both lists are in the order of their pairs. The nearest point of a pair is the same one, if

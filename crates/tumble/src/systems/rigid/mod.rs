@@ -13,6 +13,7 @@ mod joint;
 mod lever;
 mod solids;
 mod solve;
+mod wide;
 
 pub use body::Body;
 pub use contact::{Bodies, Hull, pose};
@@ -25,7 +26,7 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::{Quat, Real};
 use crate::system::{Archive, Part, System};
-use contact::{CONTACT, Contact};
+use contact::{CONTACT, Contact, Near};
 use joint::Joints;
 use lever::Pace;
 use std::ops::Range;
@@ -100,7 +101,7 @@ impl Rigid {
     /// The two surfaces that overlap most at the start, by more than round-off, the index of the first, if its object has several, and how deep [m].
     pub fn overlap(&mut self) -> Option<(&str, Option<usize>, &str, f64)> {
         self.place_solids(0.0, 0.0);
-        let found = contact::contacts(&self.bodies, 0.0, &self.joints.apart()).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+        let found = Near::default().contacts(&self.bodies, 0.0, &self.joints.apart()).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
         let [a, b] = found.pair.map(|i| i as usize);
         let least = OVERLAP * self.bodies.hulls[self.bodies.hull[a] as usize].reach;
         let (object, index) = self.owner(a)?;
@@ -197,7 +198,7 @@ impl Rigid {
     }
 
     /// A sub-step of h seconds; constant forces through the centres of bodies have changed their velocities by `gains` for it.
-    fn step(&mut self, t: f64, h: f64, gains: &[Vector]) {
+    fn step(&mut self, t: f64, h: f64, gains: &[Vector], near: &mut Near) {
         self.place_solids(t, h);
         let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
         let moving = self.bodies.moving;
@@ -205,7 +206,7 @@ impl Rigid {
             body.orient();
             body.v = body.v + gravity * h;
         }
-        let mut contacts = contact::contacts(&self.bodies, h, &self.joints.apart());
+        let mut contacts = near.contacts(&self.bodies, h, &self.joints.apart());
         contact::carry(&self.bodies, &self.contacts, &mut contacts);
         let pace = Pace { t, h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
         let rows = &mut self.bodies.rows;
@@ -363,6 +364,7 @@ impl System for Rigid {
         let h = dt / f64::from(n);
         self.shift(0.5 * (dt + h));
         let gains = self.gains(1.0 / f64::from(n));
+        let mut near = Near::default();
         for k in 0..n {
             if !go_on() {
                 return Ok(report);
@@ -370,7 +372,7 @@ impl System for Rigid {
             let steady = std::mem::take(&mut self.steady);
             self.push(&steady, 1.0 / f64::from(n));
             self.steady = steady;
-            self.step(t + f64::from(k) * h, h, &gains);
+            self.step(t + f64::from(k) * h, h, &gains, &mut near);
             report.stepped(h);
         }
         self.steady.clear();

@@ -11,171 +11,76 @@ use super::body::Body;
 use super::contact::Contact;
 use super::direct::Rows;
 use super::joint::Joints;
-use super::lever::{FASTEST, Lever, Pace, Twist, two};
-use crate::geometry::Vector;
-use crate::math::parallel::fold;
+use super::lever::{Lever, Pace, Twist};
+use super::wide::{Blocks, across, meeting};
+use crate::geometry::{self, Vector};
 
-/// Overlaps are mended as by springs of this frequency over that of sub-steps, twice as much against what nothing moves.
-const MEND: f64 = 0.25;
-/// Damping ratio of these.
-const DAMPING: f64 = 10.0;
 /// Rounds of bounces at most.
 const ROUNDS: usize = 200;
 /// Sweeps over the points of a pair that bounces, at most.
 const SWEEPS: usize = 100;
 
-/// Friction against sliding, or against rolling: impulses along two levers, both together at most in proportion to the impulse along the normal.
-#[derive(Clone)]
-struct Friction {
-    /// Two directions across the normal, or axes.
-    levers: [Lever; 2],
-    /// The inverse of K along them: xx, yy, xy [kg], or [kg m²].
+/// A point of a pair that bounces.
+struct Row {
+    /// The normal.
+    normal: Lever,
+    /// 1/(n K n) [kg].
+    mass: f64,
+    /// Two directions across the normal.
+    across: [Lever; 2],
+    /// The inverse of K along them: xx, yy, xy [kg].
     inverse: [f64; 3],
     /// 1 over the largest eigenvalue of K.
     slide: f64,
     /// Speeds of belts along them [m/s].
     belt: [f64; 2],
-    /// The largest impulse over that along the normal, of what rests and of what moves [1], or [m].
-    bounds: [f64; 2],
-    /// Impulses along them [N s], or [N m s].
-    impulse: [f64; 2],
+    /// Coulomb friction.
+    friction: geometry::Friction,
+    /// Impulses along the normal and across it [N s].
+    press: f64,
+    drag: [f64; 2],
 }
 
-impl Friction {
-    /// Along two levers of bodies with the sum `inverse_mass` [1/kg], as it was at first.
-    fn new(levers: [Lever; 2], inverse_mass: f64, bounds: [f64; 2], impulse: [f64; 2]) -> Self {
+impl Row {
+    fn new(bodies: &[Body], c: &Contact, arms: [Vector; 2]) -> Self {
+        let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
+        let inverse_mass = a.inverse_mass + b.inverse_mass;
+        let (normal, along) = (Lever::new(pair, arms, c.normal), across(c.normal));
+        let levers = along.map(|along| Lever::new(pair, arms, along));
         let k = |i: usize, j: usize| levers[i].compliance(&levers[j], inverse_mass);
         let [xx, yy, xy] = [k(0, 0), k(1, 1), k(0, 1)];
         let det = xx * yy - xy * xy;
-        let slide = 2.0 / (xx + yy + ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt());
-        Self { levers, inverse: [yy / det, xx / det, -xy / det], slide, belt: [0.0; 2], bounds, impulse }
+        Self {
+            mass: 1.0 / normal.compliance(&normal, inverse_mass),
+            normal,
+            across: levers,
+            inverse: [yy / det, xx / det, -xy / det],
+            slide: 2.0 / (xx + yy + ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt()),
+            belt: along.map(|along| c.belt.dot(along)),
+            friction: c.friction,
+            press: 0.0,
+            drag: [0.0; 2],
+        }
     }
 
-    /// Within Coulomb's cone over an impulse along the normal [N s].
-    #[inline(always)]
-    fn rub(&mut self, press: f64, a: &mut Twist, b: &mut Twist) {
-        let [s, t] = &self.levers;
+    /// Friction within Coulomb's cone over the impulse along the normal, as in `wide`.
+    fn rub(&mut self, a: &mut Twist, b: &mut Twist) {
+        let [s, t] = &self.across;
         let (x, y) = (s.speed(a, b) + self.belt[0], t.speed(a, b) + self.belt[1]);
-        let ([xx, yy, xy], [p, q], [resting, sliding]) = (self.inverse, self.impulse, self.bounds);
+        let ([xx, yy, xy], [p, q]) = (self.inverse, self.drag);
         let mut new = [p - (xx * x + xy * y), q - (xy * x + yy * y)];
         let square = |[p, q]: [f64; 2]| p * p + q * q;
-        if square(new) > (resting * press) * (resting * press) {
-            // With the inverse of K, the impulse would not point against the slide: a step along that, and back to the cone.
+        if square(new) > (self.friction.resting * self.press).powi(2) {
             new = [p - self.slide * x, q - self.slide * y];
-            let (most, length) = (sliding * press, square(new).sqrt());
+            let (most, length) = (self.friction.sliding * self.press, square(new).sqrt());
             if length > most {
                 new = new.map(|p| p * (most / length));
             }
         }
         s.push(a, b, new[0] - p);
         t.push(a, b, new[1] - q);
-        self.impulse = new;
+        self.drag = new;
     }
-
-    /// Its impulse as a vector along those of its levers.
-    fn sum(&self, along: impl Fn(&Lever) -> Vector) -> Vector {
-        along(&self.levers[0]) * self.impulse[0] + along(&self.levers[1]) * self.impulse[1]
-    }
-}
-
-/// A contact as the passes see it.
-#[derive(Clone)]
-struct Row {
-    pair: [u32; 2],
-    /// The normal.
-    normal: Lever,
-    /// 1/(n K n) [kg].
-    mass: f64,
-    /// Against sliding, and against rolling, if there is some.
-    friction: Friction,
-    rolling: Option<Box<Friction>>,
-    /// Speed of approach that is left by a soft pass, negative to part what overlaps, and by a rigid pass [m/s].
-    bias: [f64; 2],
-    /// Factors of a soft pass on the effective mass and on the accumulated impulse.
-    soft: [f64; 2],
-    /// Impulse along the normal [N s].
-    press: f64,
-}
-
-impl Row {
-    fn new(bodies: &[Body], c: &Contact, pace: &Pace) -> Self {
-        let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
-        let n = c.normal;
-        let least = if n.x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-        let t = n.cross(Vector::from(least)).normalized();
-        let across = [t, n.cross(t)];
-        let inverse_mass = a.inverse_mass + b.inverse_mass;
-        let normal = Lever::new(pair, c.arms, n);
-        let along = across.map(|along| Lever::new(pair, c.arms, along));
-        let bounds = [c.friction.resting, c.friction.sliding];
-        let belt = across.map(|along| c.belt.dot(along));
-        let friction = Friction { belt, ..Friction::new(along, inverse_mass, bounds, across.map(|along| c.drag.dot(along))) };
-        let rolls = || Friction::new(across.map(|axis| Lever::about(pair, axis)), 0.0, [c.rolling; 2], across.map(|axis| c.roll.dot(axis)));
-        let fixed = a.inverse_mass == 0.0 || b.inverse_mass == 0.0;
-        // h ω of the springs.
-        let rate = std::f64::consts::TAU * MEND * if fixed { 2.0 } else { 1.0 };
-        let damped = 2.0 * DAMPING + rate;
-        let left = 1.0 / (1.0 + rate * damped);
-        let (bias, soft) = if c.gap > 0.0 {
-            (c.gap / pace.h, [1.0, 0.0])
-        } else {
-            ((c.gap * rate / (pace.h * damped)).max(-FASTEST), [rate * damped * left, left])
-        };
-        Self {
-            pair: c.pair,
-            mass: 1.0 / normal.compliance(&normal, inverse_mass),
-            normal,
-            friction,
-            rolling: (c.rolling > 0.0).then(|| Box::new(rolls())),
-            bias: [bias, c.gap.max(0.0) / pace.h],
-            soft,
-            press: c.press,
-        }
-    }
-
-    /// The same contact of two bodies that have moved.
-    fn moved(&mut self, bodies: &[Body], c: &Contact) {
-        let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
-        if a.inverse_mass > 0.0 && b.inverse_mass > 0.0 {
-            let arms = meeting(pair, [a.x, b.x], c.arms);
-            self.normal = Lever::new(pair, arms, self.normal.along);
-            let levers = &mut self.friction.levers;
-            *levers = levers.map(|lever| Lever::new(pair, arms, lever.along));
-            if let Some(rolling) = &mut self.rolling {
-                rolling.levers = rolling.levers.map(|lever| Lever::about(pair, lever.arms[0]));
-            }
-        }
-    }
-
-    /// Friction against sliding.
-    #[inline(always)]
-    fn rub(&mut self, a: &mut Twist, b: &mut Twist) {
-        if self.friction.bounds[0] > 0.0 {
-            self.friction.rub(self.press, a, b);
-        }
-    }
-
-    /// One pass over a contact.
-    #[inline(always)]
-    fn pass(&mut self, twists: &mut [Twist], soft: bool) {
-        let (a, b) = two(twists, self.pair);
-        let (bias, [mass, left]) = if soft { (self.bias[0], self.soft) } else { (self.bias[1], [1.0, 0.0]) };
-        let speed = self.normal.speed(a, b);
-        let press = (self.press - self.mass * mass * (speed + bias) - left * self.press).max(0.0);
-        self.normal.push(a, b, press - self.press);
-        self.press = press;
-        self.rub(a, b);
-        if let Some(rolling) = &mut self.rolling {
-            rolling.rub(press, a, b);
-        }
-    }
-}
-
-/// Arms of a contact of two bodies at other places: it goes with the smaller one, and both still push at one point, so that no angular momentum is
-/// lost.
-fn meeting(pair: [&Body; 2], [a, b]: [Vector; 2], [ra, rb]: [Vector; 2]) -> [Vector; 2] {
-    let [one, two] = pair.map(|body| body.inertia.iter().sum::<f64>());
-    if one <= two { [ra, a + ra - b] } else { [b + rb - a, rb] }
 }
 
 /// Bounces: each pair that closes within the sub-step turns its approach round, one pair after the other until none approaches.
@@ -209,11 +114,7 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
     });
     let closing: Vec<(&Contact, f64)> = closing.collect();
     let Some(t) = closing.iter().map(|(_, t)| *t).min_by(f64::total_cmp) else { return false };
-    let met = closing.iter().map(|(c, _)| {
-        let arms = meeting([a, b], [a.x + a.v * t, b.x + b.v * t], c.arms);
-        let none = Vector::default();
-        Row::new(bodies, &Contact { arms, press: 0.0, drag: none, roll: none, ..(*c).clone() }, pace)
-    });
+    let met = closing.iter().map(|(c, _)| Row::new(bodies, c, meeting([a, b], [a.x + a.v * t, b.x + b.v * t], c.arms)));
     let mut rows: Vec<Row> = met.collect();
     let [mut one, mut two] = [Twist::of(a), Twist::of(b)];
     // Speeds after: gravity has pulled for all of the sub-step, the part after the meeting comes on top of what bounces.
@@ -258,49 +159,32 @@ pub fn solve(
     pace: &Pace,
     go: impl FnOnce(&mut [Body], &[Contact], &Joints),
 ) {
-    let made =
-        |bodies: &[Body]| fold(contacts.len(), |range| contacts[range].iter().map(|c| Row::new(bodies, c, pace)).collect::<Vec<_>>());
-    let mut rows: Vec<Row> = made(bodies).concat();
+    let mut blocks = Blocks::new(bodies, contacts, pace);
     let mut first = Rows::new(joints, bodies, pace, None);
     // The last one is the world.
     let now = |bodies: &[Body]| -> Vec<Twist> { bodies.iter().chain([&Body::WORLD]).map(Twist::of).collect() };
     let mut twists = now(bodies);
-    for row in &rows {
-        let (a, b) = two(&mut twists, row.pair);
-        row.normal.push(a, b, row.press);
-        for friction in std::iter::once(&row.friction).chain(row.rolling.as_deref()) {
-            friction.levers.iter().zip(friction.impulse).for_each(|(lever, impulse)| lever.push(a, b, impulse));
-        }
-    }
-    let passes = |joints: &mut Rows, rows: &mut [Row], twists: &mut [Twist], soft: bool| {
+    blocks.start(&mut twists);
+    let passes = |joints: &mut Rows, blocks: &mut Blocks, twists: &mut [Twist], soft: bool| {
         for _ in 0..pace.iterations {
             joints.pass(twists);
-            rows.iter_mut().for_each(|row| row.pass(twists, soft));
+            blocks.pass(twists, soft);
         }
     };
     let back = |bodies: &mut [Body], twists: &[Twist]| {
         bodies.iter_mut().zip(twists).for_each(|(body, twist)| (body.v, body.w) = (twist.v, twist.w));
     };
     first.give(&mut twists);
-    passes(&mut first, &mut rows, &mut twists, true);
+    passes(&mut first, &mut blocks, &mut twists, true);
     back(bodies, &twists);
-    keep(contacts, &rows);
+    blocks.keep(contacts);
     go(bodies, contacts, joints);
-    rows.iter_mut().zip(&*contacts).for_each(|(row, c)| row.moved(bodies, c));
+    blocks.moved(bodies, contacts);
     let mut last = Rows::new(joints, bodies, pace, Some(&first.all));
     let mut twists = now(bodies);
     last.give(&mut twists);
-    passes(&mut last, &mut rows, &mut twists, false);
+    passes(&mut last, &mut blocks, &mut twists, false);
     back(bodies, &twists);
-    keep(contacts, &rows);
+    blocks.keep(contacts);
     joints.load([&first.all, &last.all], pace.h);
-}
-
-/// What the passes have found.
-fn keep(contacts: &mut [Contact], rows: &[Row]) {
-    for (c, row) in contacts.iter_mut().zip(rows) {
-        c.press = row.press;
-        c.drag = row.friction.sum(|lever| lever.along);
-        c.roll = row.rolling.as_ref().map_or(Vector::default(), |rolling| rolling.sum(|lever| lever.arms[0]));
-    }
 }
