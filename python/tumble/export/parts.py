@@ -51,6 +51,8 @@ class Part:
     """Texture coordinates of the corners of triangles, 3 m x 2, or of roots of strands, n x 2."""
     body: tuple[str, int] | None = None
     """Object and index of the body that it is, which moves as a whole."""
+    grows: bool = False
+    """Whether its bodies are born during the run."""
 
     @property
     def name(self) -> str:
@@ -120,6 +122,7 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
 
     taken = {"camera", "key_light", "sky", "looks", "physics", "joints"}
     held = jointed(run.scene)
+    known = bodies(run.scene)
 
     def path(name: str) -> str:
         stem = Tf.MakeValidIdentifier(name)
@@ -150,14 +153,15 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
             # The columns of frames are not those of the mesh: no object has a name with a slash.
             mesh = replace(thing, name=f"{thing.name}/mesh", position=thing.vertices, vertices=None)
             edges = split(thing.vertices, thing.triangles)
-            if (n := len(positions(start, thing))) == 1 or thing.name in held:
+            grows = bool(known.get(thing.name, {}).get("emit"))
+            if not grows and ((n := len(positions(start, thing))) == 1 or thing.name in held):
                 for k in range(n):
                     title = f"{thing.name} {k}" if n > 1 else thing.name
                     made.append(Part(mesh, path(title), title, "Mesh", cut=edges, body=(thing.name, k)))
                 continue
             where, title = path(thing.name), f"{thing.name} mesh"
             inner = where + path(title).removeprefix(ROOT)
-            made.append(Part(thing, where, thing.name, "PointInstancer"))
+            made.append(Part(thing, where, thing.name, "PointInstancer", grows=grows))
             made.append(Part(mesh, inner, title, "Mesh", cut=edges))
         elif len(thing.triangles):
             kind, words = kinds.get(thing.name, ("", {}))
@@ -189,7 +193,19 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
 
 def jointed(scene: Mapping[str, Any]) -> set[str]:
     """Names of the objects that joints hold: each of their bodies is a prim of its own, which a joint can name."""
-    return {joint_end(scene, text)[0] for joint in scene.get("joint", ()) for text in joint["between"]}
+    names = {joint_end(scene, text)[0] for joint in scene.get("joint", ()) for text in joint["between"]}
+    return names | {name for name, body in bodies(scene).items() if body["name"] in names}
+
+
+def bodies(scene: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Words of the bodies of a scene by the names of their objects in frames: those that break are their pieces."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for body in scene.get("body", ()):
+        fracture = body.get("fracture")
+        count = 0 if not fracture else fracture.get("pieces") or len(fracture.get("sites", ()))
+        for name in [f"{body['name']}.{k + 1}" for k in range(count)] or [body["name"]]:
+            found[name] = body
+    return found
 
 
 def joint_end(scene: Mapping[str, Any], text: str) -> tuple[str, int | None]:
@@ -329,6 +345,10 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
     columns = now.columns
     if part.thing.vertices is not None:
         yield from _bodies(part.thing, part.thing.vertices, columns)
+        if part.grows:
+            n = len(positions(columns, part.thing))
+            yield "protoIndices", "int[]", np.zeros(n, dtype=np.int32)
+            yield "ids", "int64[]", np.arange(n, dtype=np.int64)
         return
     if part.trail:
         points, counts = now.ways[part.thing.name]

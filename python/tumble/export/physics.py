@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.export.parts import ROOT, Now, Part, joint_end
+from tumble.export.parts import ROOT, Now, Part, bodies, joint_end
 from tumble.pictures.things import Recording
 
 SHAPES = {"sphere": "boundingSphere", "box": "boundingCube"}
@@ -71,16 +71,16 @@ def fill(stage: Any, run: Recording, parts: list[Part], start: Now) -> None:
     """Applies the schemas to the prims of all parts, and defines the joints; nothing where the run has no bodies."""
     from pxr import UsdGeom
 
-    bodies = {body["name"]: body for body in run.scene.get("body", ())}
-    if not bodies:
+    words = bodies(run.scene)
+    if not words:
         return
     _world(stage, run)
     colliders = {collider["name"]: collider for collider in run.scene.get("collider", ())}
     for part in parts:
         name = part.thing.name.removesuffix("/mesh")
         prim = stage.GetPrimAtPath(part.path)
-        if name in bodies and part.kind == "Mesh":
-            _body(stage, prim, run, part, bodies[name], start)
+        if name in words and part.kind == "Mesh":
+            _body(stage, prim, run, part, words[name], start)
         elif name in colliders and part.kind == "Mesh":
             _collider(stage, prim, part, colliders[name], start)
     poses = dict(_poses(parts, start))
@@ -120,12 +120,12 @@ def _body(stage: Any, prim: Any, run: Recording, part: Part, words: Mapping[str,
             all_ = np.reshape(words.get(column) or [[0.0] * 3] if own is None else own, (-1, 3))
             create(Gf.Vec3f(*(unit * float(v) for v in all_[row if len(all_) > 1 else 0])))
     weight = UsdPhysics.MassAPI.Apply(prim)
-    masses = np.ravel(run.static[words["name"]]["mass"])
+    masses = np.ravel(run.static[part.thing.name.removesuffix("/mesh")]["mass"])
     weight.CreateMassAttr(float(masses[part.body[1] if part.body is not None else 0]))
     weight.CreateCenterOfMassAttr(Gf.Vec3f(0.0))
     if words.get("inertia"):
         weight.CreateDiagonalInertiaAttr(Gf.Vec3f(*map(float, words["inertia"])))
-    shape = next(iter(words.get("shape", ())), "")
+    shape = "" if words.get("fracture") else next(iter(words.get("shape", ())), "")
     _collides(stage, prim, SHAPES.get(shape, "convexHull"), words)
 
 
@@ -169,16 +169,24 @@ def _poses(parts: list[Part], start: Now) -> Iterator[tuple[tuple[str, int], Pos
 def _joints(stage: Any, run: Recording, words: Mapping[str, Any], poses: Mapping[tuple[str, int], Pose]) -> None:
     """A joint of the scene, or each of a chain. The first of its bodies is `body1`, whose motion against the other counts."""
     ends = [joint_end(run.scene, text) for text in words["between"]]
+    at = words.get("at")
+    pieces = [name for name, body in bodies(run.scene).items() if body["name"] == ends[0][0]]
     if words.get("chain"):
-        name = ends[0][0]
-        last = max(row for other, row in poses if other == name)
-        pairs = [(poses[name, k + 1], poses[name, k]) for k in range(last)]
+        last = max(row for name, row in poses if name in pieces)
+        pairs = [(_pose(run, poses, ends[0][0], k + 1, at), _pose(run, poses, ends[0][0], k, at)) for k in range(last)]
     else:
-        two = [poses[name, row or 0] for name, row in ends]
+        two = [_pose(run, poses, name, row or 0, at) for name, row in ends]
         pairs = [(two[0], two[1] if len(two) > 1 else WORLD)]
     for k, pair in enumerate(pairs):
         stem = f"{words['name']} {k}" if words.get("chain") else words["name"]
         _joint(stage, run, stem, words, *pair)
+
+
+def _pose(run: Recording, poses: Mapping[tuple[str, int], Pose], name: str, row: int, at: Any) -> Pose:
+    """A body, of one that breaks the piece whose centre is nearest to a point of the world, or to the middle of all."""
+    own = [poses[other, row] for other, body in bodies(run.scene).items() if body["name"] == name]
+    point = np.mean([pose.position for pose in own], axis=0) if at is None else np.asarray(at, dtype=float)
+    return min(own, key=lambda pose: float(np.linalg.norm(pose.position - point)))
 
 
 def _joint(stage: Any, run: Recording, name: str, words: Mapping[str, Any], first: Pose, second: Pose) -> None:

@@ -41,7 +41,7 @@ pub use joints::{Joint, JointKind, JointMotor};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
-pub use rigid::{Arrange, Body, BodyPart, BodyShape, Rigid};
+pub use rigid::{Arrange, BirthRegion, Body, BodyEmit, BodyPart, BodyShape, Fracture, Rigid};
 pub use shapes::{Collider, Content, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{Block, Cloud, CloudShape, Galaxy, Halo, Material, Net, Particles, Pattern, Profile, Rod, Rope, Sheet, Spring};
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};

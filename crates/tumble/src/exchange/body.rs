@@ -52,6 +52,8 @@ pub struct BodyState {
     pub inverse_mass: f64,
     /// Inverse of the inertia about the centre of mass, in the axes of the world: xx, yy, zz, xy, yz, zx [1/(kg m²)].
     pub inverse_inertia: [f64; 6],
+    /// Whether it is there: rows may be kept for what is born, or breaks off.
+    pub present: bool,
 }
 
 impl Default for BodyState {
@@ -68,6 +70,7 @@ impl Default for BodyState {
             footing: (zero, [0.0; 6]),
             inverse_mass: 0.0,
             inverse_inertia: [0.0; 6],
+            present: true,
         }
     }
 }

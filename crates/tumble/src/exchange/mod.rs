@@ -221,9 +221,10 @@ impl Exchange {
         self.repeat.is_some()
     }
 
-    /// Gives rows of a body a surface, which systems of masses visit.
-    pub fn cover(&mut self, surface: BodySurface) {
+    /// Gives rows of a body a surface, which systems of masses visit; returns its place among all.
+    pub fn cover(&mut self, surface: BodySurface) -> usize {
         self.body_surfaces.push(surface);
+        self.body_surfaces.len() - 1
     }
 
     /// Whether two rows of bodies are the same row of a system.
@@ -414,6 +415,13 @@ impl Turn<'_> {
             *delivered = *delivered + letter.wrench.impulse;
         }
         mine.into_iter().map(|letter| push(letter.address, letter.wrench)).collect()
+    }
+
+    /// Gives a surface of its bodies another shape, with its reach [m] and volume [m³]: they have broken.
+    pub fn cover_anew(&mut self, place: usize, solid: &Arc<Collider>, reach: f64, volume: f64) {
+        if let Some(surface) = self.exchange.body_surfaces.get_mut(place) {
+            (surface.solid, surface.reach, surface.volume) = (solid.clone(), reach, volume);
+        }
     }
 
     /// Its bodies, to publish them.

@@ -1,12 +1,10 @@
 //! Where the bodies of an object stand.
 
 use crate::geometry::Vector;
-use crate::math::functions::{cos, sin};
 use crate::math::rotation::{by, from_degrees};
 use crate::math::{Quat, Random};
-use crate::systems::rigid::Hull;
+use crate::systems::rigid::{Hull, any_turn};
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use tumble_interface::scene::{Arrange, Body as Words, BodyShape};
 
 /// Places that are tried for a body that is strewn.
@@ -120,10 +118,4 @@ fn scattered(words: &Words, seed: u32, count: u32, [center, size]: [Vector; 2], 
         places.push(place);
     }
     Ok(places)
-}
-
-/// A turn of three uniform numbers, all turns being as likely [shoemake1992].
-fn any_turn([u, v, w, _]: [f64; 4]) -> Quat<f64> {
-    let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
-    Quat { v: Vector { x: a * sin(TAU * v), y: a * cos(TAU * v), z: b * sin(TAU * w) }, w: b * cos(TAU * w) }
 }

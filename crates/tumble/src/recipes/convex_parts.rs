@@ -38,21 +38,23 @@ const NORMALS: [[f64; 3]; 13] = [
 
 /// A flat face of a piece.
 #[derive(Clone, Default)]
-struct Face {
+pub struct Face {
     /// Its sides, counter-clockwise from outside around what is filled.
-    sides: Vec<[Vector; 2]>,
+    pub sides: Vec<[Vector; 2]>,
+    /// The piece on its other side, where that is told.
+    pub beyond: Option<usize>,
 }
 
 impl Face {
     /// Its area times its normal, outwards [m²].
-    fn area(&self) -> Vector {
+    pub fn area(&self) -> Vector {
         let Some([origin, _]) = self.sides.first() else { return Vector::default() };
         self.sides.iter().fold(Vector::default(), |sum, [a, b]| sum + (*a - *origin).cross(*b - *origin) * 0.5)
     }
 }
 
 /// A plane: its unit normal, and its distance from the origin [m].
-type Plane = (Vector, f64);
+pub type Plane = (Vector, f64);
 
 /// A piece of the mesh.
 struct Piece {
@@ -147,13 +149,13 @@ pub fn enclosed(mesh: &Mesh) -> f64 {
 }
 
 /// The triangles of a mesh.
-fn faces(mesh: &Mesh) -> Vec<Face> {
+pub fn faces(mesh: &Mesh) -> Vec<Face> {
     let corners = mesh.triangles.iter().map(|t| t.map(|i| Vector::from(mesh.vertices[i as usize])));
-    corners.map(|[a, b, c]| Face { sides: vec![[a, b], [b, c], [c, a]] }).collect()
+    corners.map(|[a, b, c]| Face { sides: vec![[a, b], [b, c], [c, a]], beyond: None }).collect()
 }
 
 /// Volume of what faces enclose [m³].
-fn volume(faces: &[Face]) -> f64 {
+pub fn volume(faces: &[Face]) -> f64 {
     let Some([origin, _]) = faces.iter().find_map(|face| face.sides.first()) else { return 0.0 };
     faces.iter().filter_map(|face| Some((face.sides.first()?[0] - *origin).dot(face.area()) / 3.0)).sum()
 }
@@ -166,7 +168,7 @@ pub fn centered_hull(points: &[V]) -> Option<(SharedShape, Pose)> {
 }
 
 /// The convex hull of faces, and its volume [m³].
-fn hull(faces: &[Face], size: f64) -> Option<((SharedShape, Pose), f64)> {
+pub fn hull(faces: &[Face], size: f64) -> Option<((SharedShape, Pose), f64)> {
     let cell = |p: &Vector| <[f64; 3]>::from(*p).map(|c| (c / (WELD * size)).round() as i64);
     let mut corners: Vec<([i64; 3], Vector)> = faces.iter().flat_map(|face| &face.sides).map(|[a, _]| (cell(a), *a)).collect();
     corners.sort_by_key(|(cell, _)| *cell);
@@ -181,10 +183,10 @@ fn hull(faces: &[Face], size: f64) -> Option<((SharedShape, Pose), f64)> {
 }
 
 /// What of faces lies below a plane, and what above, both closed by the section.
-fn cut(faces: &[Face], (n, d): Plane) -> [Vec<Face>; 2] {
+pub fn cut(faces: &[Face], (n, d): Plane) -> [Vec<Face>; 2] {
     let (mut parts, mut caps) = ([Vec::new(), Vec::new()], [Face::default(), Face::default()]);
     for face in faces {
-        let mut kept = [Face::default(), Face::default()];
+        let mut kept = [0, 1].map(|_| Face { sides: Vec::new(), beyond: face.beyond });
         // Where its outline passes the plane, and whether it leaves what is below.
         let mut passes: Vec<(Vector, bool)> = Vec::new();
         for [a, b] in &face.sides {

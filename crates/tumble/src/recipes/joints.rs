@@ -24,8 +24,8 @@ pub struct Made {
     pub far: Option<[f64; 2]>,
 }
 
-/// Objects by name, and their rows.
-pub type Named<'a> = [(&'a str, Range<usize>)];
+/// Objects by name, their rows, and how many of these each of their bodies has.
+pub type Named<'a> = [(&'a str, Range<usize>, usize)];
 
 /// Object and index of an end: "flag 3".
 pub fn named(words: &str) -> Option<(&str, usize)> {
@@ -35,24 +35,25 @@ pub fn named(words: &str) -> Option<(&str, usize)> {
 /// The row of an end: "link 3", or "door", if there is one.
 fn row(words: &str, k: usize, objects: &Named<'_>) -> Result<usize, Wrong> {
     let wrong = |message: String| Err((format!(".between[{k}]"), message));
-    let known = |name: &str| objects.iter().find(|(known, _)| *known == name);
+    let known = |name: &str| objects.iter().find(|(known, ..)| *known == name);
     let (name, index) = match (known(words), named(words)) {
         (None, Some((name, index))) => (name, Some(index)),
         _ => (words, None),
     };
-    let Some((_, rows)) = known(name) else {
-        let hint = suggestion(name, objects.iter().map(|(known, _)| *known));
+    let Some((_, rows, each)) = known(name) else {
+        let hint = suggestion(name, objects.iter().map(|(known, ..)| *known));
         let message = format!(
             "there is no body \"{name}\" in the system of the joint{hint}; for the world leave it out, soft objects are held by an [[anchor]]"
         );
         return wrong(message);
     };
+    let count = rows.len() / each;
     match index {
-        None if rows.len() > 1 => wrong(format!("\"{name}\" has {} bodies; say which: \"{name} 0\"", rows.len())),
-        Some(index) if index >= rows.len() => {
-            wrong(format!("there is no body {index} in \"{name}\"; the last one is {}", rows.len().saturating_sub(1)))
+        None if count > 1 => wrong(format!("\"{name}\" has {count} bodies; say which: \"{name} 0\"")),
+        Some(index) if index >= count => {
+            wrong(format!("there is no body {index} in \"{name}\"; the last one is {}", count.saturating_sub(1)))
         }
-        index => Ok(rows.start + index.unwrap_or(0)),
+        index => Ok(rows.start + index.unwrap_or(0) * each),
     }
 }
 
@@ -60,13 +61,13 @@ fn row(words: &str, k: usize, objects: &Named<'_>) -> Result<usize, Wrong> {
 fn pairs(words: &Words, objects: &Named<'_>) -> Result<Vec<[u32; 2]>, Wrong> {
     match &words.between[..] {
         [name] if words.chain => {
-            let Some((_, rows)) = objects.iter().find(|(known, _)| known == name) else {
+            let Some((_, rows, each)) = objects.iter().find(|(known, ..)| known == name) else {
                 return Err((row(name, 0, objects).err()).unwrap_or_else(|| (".between[0]".into(), "expected an object alone".into())));
             };
-            if rows.len() < 2 {
+            if rows.len() < 2 * each {
                 return Err((".chain".into(), format!("\"{name}\" has one body; a chain needs at least two")));
             }
-            Ok((rows.start..rows.end - 1).map(|i| [i as u32, i as u32 + 1]).collect())
+            Ok((rows.start..rows.end - each).step_by(*each).map(|i| [i, i + each].map(|i| i as u32)).collect())
         }
         [_, ..] if words.chain => Err((".between".into(), "two names with chain = true; name the object whose bodies it joins".into())),
         [first, second] => {

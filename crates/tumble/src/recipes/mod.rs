@@ -14,6 +14,7 @@ mod cut;
 mod dress;
 mod emitter;
 mod figures;
+mod fracture;
 mod galaxy;
 mod grains;
 mod guides;

@@ -2,13 +2,15 @@
 
 use super::arrange::{Place, Wrong, each, places};
 use super::body_shape::{Solid, solid};
-use crate::geometry::{Collider, Facets, Friction, Shape, Vector};
-use crate::math::Quat;
-use crate::math::rotation::from_degrees;
-use crate::systems::rigid::{Body, Hull, pose};
+use super::fracture::{self, Whole};
+use crate::geometry::{Collider, Facets, Friction, Sampler, Shape, Vector};
+use crate::math::rotation::{from_degrees, from_z_to};
+use crate::math::{Quat, Random};
+use crate::systems::rigid::{Birth, Body, Frame, Hull, Pattern, pose};
 use parry3d_f64::math::Pose;
+use std::sync::Arc;
 use tumble_interface::Mesh;
-use tumble_interface::scene::{Body as Words, BodyShape, MeshFile};
+use tumble_interface::scene::{BirthRegion, Body as Words, BodyEmit, BodyShape, MeshFile};
 
 /// Bodies of an object, in their principal axes about their centre of mass.
 pub struct Made {
@@ -23,9 +25,18 @@ pub struct Made {
     pub mesh: Mesh,
     /// Their states at the start.
     pub bodies: Vec<Body>,
+    /// How they are born, if that is during the run.
+    pub birth: Option<Birth>,
+    /// How they break, if they do.
+    pub pattern: Option<Arc<Pattern>>,
 }
 
 impl Made {
+    /// How many bodies there are, at most.
+    pub fn count(&self) -> usize {
+        self.birth.as_ref().map_or(self.bodies.len(), |birth| birth.count)
+    }
+
     /// Volume of each [m³].
     pub fn volume(&self) -> f64 {
         self.form.volume
@@ -52,6 +63,60 @@ fn touched(words: &BodyShape, mesh: &Mesh, back: impl Fn(Vector) -> Vector, turn
             let vertices = mesh.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect();
             Shape::Animated { facets: Facets::new(&[&Mesh { vertices, ..mesh.clone() }], &[0.0])?, shell: false }
         }
+    })
+}
+
+/// How bodies are born, of which `like` is one without velocities; `axes` are their own in those of the words.
+fn birth(words: &Words, emit: &BodyEmit, seed: u32, axes: Quat<f64>, like: Body) -> Result<Birth, Wrong> {
+    let wrong = |key: &str, message: &str| Err((key.to_string(), message.to_string()));
+    if words.arrange.is_some() {
+        return wrong(".arrange", "given beside emit: bodies are born where emit.from says; leave out one of them");
+    }
+    if words.position != [[0.0; 3]] {
+        return wrong(".position", "given beside emit: bodies are born where emit.from says; leave out one of them");
+    }
+    for (key, list, own) in [(".velocity", &words.velocity, "emit.velocity"), (".angular_velocity", &words.angular_velocity, "emit.spin")] {
+        if !list.is_empty() {
+            return wrong(key, &format!("given beside emit; say it of those that are born: {own}"));
+        }
+    }
+    if words.rotate.len() > 1 {
+        return wrong(".rotate", &format!("{} beside emit, expected none or one, of all that are born", words.rotate.len()));
+    }
+    if emit.random_turns && !words.rotate.is_empty() {
+        return wrong(".emit.random_turns", "true, and rotate is given, too; leave out one of them");
+    }
+    if emit.end.is_some_and(|end| end <= emit.start) {
+        return wrong(".emit.end", "it is not after start");
+    }
+    let from = match &emit.from {
+        BirthRegion::Point { at } => Sampler::Point(Vector::from(*at)),
+        BirthRegion::Disk { normal: [0.0, 0.0, 0.0], .. } => return wrong(".emit.from.disk.normal", "[0, 0, 0], expected a direction"),
+        BirthRegion::Disk { center, normal, radius } => {
+            Sampler::Disk(Vector::from(*center), from_z_to(Vector::from(*normal).tamed()), *radius)
+        }
+        BirthRegion::Sphere { center, radius } => Sampler::Ball(Vector::from(*center), *radius, false),
+        BirthRegion::Box { center, size, rotate } => Sampler::Box(Vector::from(*center), Vector::from(*size), from_degrees(*rotate)),
+    };
+    Ok(Birth {
+        rate: emit.rate,
+        count: emit.count as usize,
+        span: [emit.start, emit.end.unwrap_or(f64::INFINITY)],
+        from,
+        turn: (!emit.random_turns).then(|| from_degrees(each(&words.rotate, 0))),
+        axes,
+        like: Body { v: emit.velocity.into(), w: emit.spin.into(), ..like },
+        random: Random::new(seed, &words.name),
+    })
+}
+
+/// Width and height [m] of the first body as it stands.
+fn extents(words: &Words, drawn: &Mesh) -> [f64; 2] {
+    let stands = from_degrees(words.rotate.first().copied().unwrap_or_default());
+    [0, 2].map(|axis| {
+        let along = drawn.vertices.iter().map(|p| <[f64; 3]>::from(stands.turn(Vector::from(*p)))[axis]);
+        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
+        high - low
     })
 }
 
@@ -102,18 +167,13 @@ pub fn bodies(words: &Words, file: &dyn Fn(&MeshFile) -> Option<Mesh>, seed: u32
         belt: Vector::default(),
         reach,
     };
-    // Extents of the first body as it stands.
-    let stands = from_degrees(words.rotate.first().copied().unwrap_or_default());
-    let extent = |axis: usize| {
-        let along = form.drawn.vertices.iter().map(|p| <[f64; 3]>::from(stands.turn(Vector::from(*p)))[axis]);
-        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
-        high - low
-    };
-    let places = places(words, seed, [extent(0), extent(2)], center, axes, &outline)?;
+    let like = Body { inverse_mass: 1.0 / mass, inertia, ..Body::WORLD };
+    let birth = words.emit.as_ref().map(|emit| birth(words, emit, seed, axes, like)).transpose()?;
+    let places = if birth.is_some() { Vec::new() } else { places(words, seed, extents(words, &form.drawn), center, axes, &outline)? };
     let n = places.len();
     let fits = |key: &str, list: &[[f64; 3]]| match list.len() {
         0 | 1 => Ok(()),
-        given if given == n => Ok(()),
+        given if given == n || birth.is_some() => Ok(()),
         given => Err((format!(".{key}"), format!("{given} for {n} bodies, expected none, one, or {n}"))),
     };
     fits("rotate", &words.rotate)?;
@@ -124,9 +184,7 @@ pub fn bodies(words: &Words, file: &dyn Fn(&MeshFile) -> Option<Mesh>, seed: u32
         q: (place.turn * axes).normalized(),
         v: each(&words.velocity, i).into(),
         w: each(&words.angular_velocity, i).into(),
-        inverse_mass: 1.0 / mass,
-        inertia,
-        inverse_inertia: [0.0; 6],
+        ..like
     };
     let bodies = places.iter().enumerate().map(body).collect();
     let Some(shape) = touched(&words.shape, &form.met, back, axes.conj()) else {
@@ -145,6 +203,19 @@ pub fn bodies(words: &Words, file: &dyn Fn(&MeshFile) -> Option<Mesh>, seed: u32
         rig: None,
         edges: None,
     };
+    let cut = |fracture| {
+        let vertices = form.met.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect();
+        let whole = Whole {
+            mesh: &Mesh { vertices, ..form.met.clone() },
+            back: &back,
+            frame: Frame { center: Vector::default(), axes: Body::WORLD.q, mass, inertia },
+            hull: outline.clone(),
+            solid: Arc::new(solid.clone()),
+            seed,
+        };
+        fracture::pattern(words, fracture, whole).map(Arc::new)
+    };
+    let pattern = words.fracture.as_ref().map(cut).transpose()?;
     let mesh = Mesh { vertices: form.drawn.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect(), ..form.drawn.clone() };
-    Ok(Made { form, own, outline, solid, mesh, bodies })
+    Ok(Made { form, own, outline, solid, mesh, bodies, birth, pattern })
 }

@@ -20,7 +20,9 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
-    for (kind, name) in objects.iter().map(|o| (o.kind, o.name)).chain(colliders) {
+    let pieces: Vec<String> = scene.body.iter().filter(|thing| thing.fracture.is_some()).flat_map(|thing| thing.parts()).collect();
+    let broken = pieces.iter().map(|name| ("body", name.as_str()));
+    for (kind, name) in objects.iter().map(|o| (o.kind, o.name)).chain(colliders).chain(broken) {
         if name.is_empty() || name.contains('/') {
             wrong(format!("{kind} \"{name}\".name"), "expected a name that is not empty and has no slash".into());
         }
@@ -123,7 +125,7 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
         wrong("output.vdb".into(), message);
     }
     for (i, probe) in scene.expect.probe.iter().enumerate() {
-        if !objects.iter().any(|o| o.name == probe.object) {
+        if !objects.iter().any(|o| o.name == probe.object) && !pieces.contains(&probe.object) {
             let hint = suggestion(&probe.object, objects.iter().map(|o| o.name));
             wrong(format!("expect.probe[{i}].object"), format!("there is no object \"{}\"{hint}", probe.object));
         }

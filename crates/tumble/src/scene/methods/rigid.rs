@@ -1,7 +1,7 @@
 //! Rigid bodies: words to shapes, masses and states.
 
 use super::{MethodRules, is_in, moves_bodies, scheme_of_its_own, touches, visits_bodies};
-use crate::exchange::BodySurface;
+use crate::exchange::{BodyRow, BodySurface};
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};
 use crate::recipes;
@@ -66,6 +66,7 @@ impl MethodRules for Rules {
                 _ => {}
             }
         }
+        changing(scene, issues);
         if scene.dimension == 2 && !scene.body.is_empty() {
             issues.push(Issue::new("dimension", "2, but rigid bodies move in space; set dimension = 3"));
         }
@@ -104,10 +105,14 @@ impl MethodRules for Rules {
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let own = scene.body.iter().filter(|t| is_in(&t.system, plan));
-        let look = |t: &Body| Look { few: t.count() < FEW, ..Look::new(&t.name, Form::Instances, colors.pick(t.color)) };
+        let look = |t: &Body| {
+            let color = colors.pick(t.color);
+            let of = |name: String| Look { few: t.count() < FEW, ..Look::new(&name, Form::Instances, color) };
+            t.parts().into_iter().map(of).collect::<Vec<_>>()
+        };
         let joints = scene.joint.iter().filter(|t| is_in(&t.system, plan));
         let held = |t: &tumble_interface::scene::Joint| Look { few: true, ..Look::new(&t.name, Form::Points, t.color.unwrap_or(SOLID)) };
-        own.map(look).chain(joints.map(held)).collect()
+        own.flat_map(look).chain(joints.map(held)).collect()
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
@@ -115,7 +120,7 @@ impl MethodRules for Rules {
             let chain = scene.body.iter().find(|thing| words.chain && words.between.first() == Some(&thing.name));
             chain.map_or(1.0, Body::count)
         };
-        BODY * (scene.body.iter().map(Body::count).sum::<f64>() + scene.joint.iter().map(of).sum::<f64>())
+        BODY * (scene.body.iter().map(rows_of).sum::<f64>() + scene.joint.iter().map(of).sum::<f64>())
     }
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
@@ -124,15 +129,21 @@ impl MethodRules for Rules {
         for thing in scene.body.iter().filter(|t| is_in(&t.system, plan)) {
             match recipes::bodies(thing, &file_of(builder.assets), scene.seed) {
                 Ok(made) => {
-                    let first = bodies.rows.len();
+                    let (first, each) = (bodies.rows.len(), thing.pieces());
                     let (hull, left) = made.hull();
                     builder.warnings.extend(left.map(|left| coarse(thing, left)));
-                    bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
-                    let (rows, volume) = (first..first + made.bodies.len(), made.volume());
-                    solids.push((rows, Arc::new(made.solid), hull.reach, volume));
-                    bodies.hulls.push(hull);
-                    bodies.rows.extend(made.bodies);
-                    objects.push(Object { name: thing.name.clone(), rows: first..bodies.rows.len(), mesh: made.mesh });
+                    let (rows, volume) = (first..first + each * made.count(), made.volume());
+                    bodies.rows.resize(rows.end, State::WORLD);
+                    made.bodies.iter().enumerate().for_each(|(i, body)| bodies.rows[first + i * each] = *body);
+                    // Clusters of pieces have surfaces of their own.
+                    for row in rows.clone() {
+                        let new = each > 1 || row == first;
+                        bodies.hulls.extend(new.then(|| hull.clone()));
+                        bodies.hull.push(bodies.hulls.len() as u32 - 1);
+                    }
+                    solids.push((Arc::new(made.solid), hull.reach, volume));
+                    let pattern = made.pattern.map(|pattern| (pattern, None));
+                    objects.push(Object { name: thing.name.clone(), rows, mesh: made.mesh, birth: made.birth, pattern });
                 }
                 Err((key, message)) => builder.issues.push(Issue::new(format!("body \"{}\"{key}", thing.name), message)),
             }
@@ -140,8 +151,16 @@ impl MethodRules for Rules {
         bodies.moving = bodies.rows.len();
         if touches(scene) {
             let rows = builder.exchange.open(builder.ids[index], 0..bodies.moving, true);
-            for (range, solid, reach, volume) in solids {
-                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach, volume });
+            for ((solid, reach, volume), object) in solids.into_iter().zip(&mut objects) {
+                let mut cover =
+                    |rows: &[BodyRow]| builder.exchange.cover(BodySurface { rows: rows.to_vec(), solid: solid.clone(), reach, volume });
+                let own = &rows[object.rows.clone()];
+                match &mut object.pattern {
+                    None => {
+                        cover(own);
+                    }
+                    Some((_, first)) => *first = own.chunks(1).map(cover).reduce(|first, _| first),
+                }
             }
         }
         for solid in builder.colliders.iter() {
@@ -166,6 +185,53 @@ impl MethodRules for Rules {
     }
 }
 
+/// Rows of a thing.
+fn rows_of(thing: &Body) -> f64 {
+    thing.count() * thing.pieces() as f64
+}
+
+/// What cannot hold or move bodies that are born, or break.
+fn changing(scene: &Scene, issues: &mut Vec<Issue>) {
+    let named = |words: &str| {
+        let name = recipes::named(words).map_or(words, |(name, _)| name).to_string();
+        scene.body.iter().find(|thing| thing.name == words || thing.name == name)
+    };
+    let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
+    for joint in &scene.joint {
+        if let Some(thing) = joint.between.iter().filter_map(|words| named(words)).find(|thing| thing.emit.is_some()) {
+            let message = format!("bodies of \"{}\" are born during the run, and are not there to be joined; leave out emit", thing.name);
+            wrong(format!("joint \"{}\".between", joint.name), message);
+        }
+    }
+    let why = |thing: &Body| match (&thing.emit, &thing.fracture) {
+        (Some(_), _) => Some("are born during the run"),
+        (_, Some(_)) => Some("break"),
+        _ => None,
+    };
+    for anchor in &scene.anchor {
+        for (k, words) in anchor.between.iter().enumerate() {
+            if let Some((thing, why)) = named(words).and_then(|thing| Some((thing, why(thing)?))) {
+                let message = format!("bodies of \"{}\" {why}; an anchor needs a body that stays as it is", thing.name);
+                wrong(format!("anchor \"{}\".between[{k}]", anchor.name), message);
+            }
+        }
+    }
+    for gas in &scene.gas {
+        for name in &gas.bodies {
+            if let Some((thing, why)) = scene.body.iter().find(|thing| thing.name == *name).and_then(|thing| Some((thing, why(thing)?))) {
+                let message = format!("bodies of \"{}\" {why}, and a gas moves bodies that stay as they are; leave them out", thing.name);
+                wrong(format!("gas \"{}\".bodies", gas.name), message);
+            }
+        }
+    }
+    for (i, probe) in scene.expect.probe.iter().enumerate() {
+        if let Some(thing) = scene.body.iter().find(|thing| thing.name == probe.object && thing.fracture.is_some()) {
+            let message = format!("\"{0}\" breaks, and its pieces are in frames: name one, as \"{0}.1\"", thing.name);
+            wrong(format!("expect.probe[{i}].object"), message);
+        }
+    }
+}
+
 /// Convex parts of a mesh are larger than it by this part, more than meant.
 fn coarse(thing: &Body, left: f64) -> Warning {
     let message = format!("its convex parts fill {} % more than its mesh; raise most, or tolerance if that will do", short(100.0 * left));
@@ -176,7 +242,7 @@ fn coarse(thing: &Body, left: f64) -> Warning {
 pub fn bodies_of(scene: &Scene, assets: &Assets, name: &str) -> Option<(usize, recipes::Made)> {
     let thing = scene.body.iter().find(|thing| thing.name == name)?;
     let before = scene.body.iter().take_while(|other| other.name != name).filter(|other| other.system == thing.system);
-    Some((before.map(Body::count).sum::<f64>() as usize, recipes::bodies(thing, &file_of(assets), scene.seed).ok()?))
+    Some((before.map(rows_of).sum::<f64>() as usize, recipes::bodies(thing, &file_of(assets), scene.seed).ok()?))
 }
 
 /// The surfaces of all bodies that masses touch, where they start.
@@ -197,7 +263,9 @@ fn file_of(assets: &Assets) -> impl Fn(&MeshFile) -> Option<Mesh> {
 
 /// The joints of a system.
 fn joined(builder: &mut Builder<'_>, plan: &Plan, objects: &[Object], bodies: &Bodies) -> (Vec<Ends>, Vec<Joint>) {
-    let named: Vec<(&str, Range<usize>)> = objects.iter().map(|object| (object.name.as_str(), object.rows.clone())).collect();
+    let each = |object: &Object| object.pattern.as_ref().map_or(1, |(pattern, _)| pattern.pieces.len());
+    let named: Vec<(&str, Range<usize>, usize)> =
+        objects.iter().map(|object| (object.name.as_str(), object.rows.clone(), each(object))).collect();
     let (mut ends, mut all) = (Vec::new(), Vec::new());
     for words in builder.scene.joint.iter().filter(|t| is_in(&t.system, plan)) {
         let path = format!("joint \"{}\"", words.name);

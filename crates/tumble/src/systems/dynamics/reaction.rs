@@ -33,6 +33,8 @@ struct Visited {
 /// The bodies of other systems, and their surfaces.
 #[derive(Default)]
 pub struct Reaction {
+    /// As they were announced, and with a motion.
+    announced: Vec<Arc<Collider>>,
     solids: Vec<Collider>,
     bodies: Vec<Visited>,
     /// Volume of each surface [m³], and its samples for each liquid.
@@ -83,7 +85,9 @@ impl Reaction {
     /// Takes the bodies of others as they are at the start of an interval; anchors tie masses to bodies.
     pub fn begin(&mut self, exchange: &Exchange, anchors: impl Iterator<Item = (usize, BodyRow)>) {
         let surfaces = exchange.body_surfaces();
-        if self.solids.len() != surfaces.len() {
+        let known = self.announced.iter().zip(surfaces).all(|(known, surface)| Arc::ptr_eq(known, &surface.solid));
+        if self.solids.len() != surfaces.len() || !known {
+            self.announced = surfaces.iter().map(|surface| surface.solid.clone()).collect();
             let still = Key { time: 0.0, shift: Vector::default(), turn: BodyState::default().orientation };
             let zero = Vector::default();
             let motion = || Motion { velocity: zero, spin: zero, pivot: zero, keys: vec![still], smooth: false };
@@ -94,7 +98,8 @@ impl Reaction {
         self.bodies.clear();
         for (solid, surface) in surfaces.iter().enumerate() {
             let reach = surface.reach + surface.solid.thickness;
-            self.bodies.extend(surface.rows.iter().map(|at| Visited { body: Visit::new(exchange, *at, reach), solid }));
+            let present = surface.rows.iter().filter(|at| exchange.state_before(**at).present);
+            self.bodies.extend(present.map(|at| Visited { body: Visit::new(exchange, *at, reach), solid }));
         }
         let bodies = &self.bodies;
         let tied =

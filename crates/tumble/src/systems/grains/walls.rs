@@ -120,7 +120,8 @@ impl Walls {
     /// Takes the bodies of others as they are at the start of an interval.
     pub fn visit(&mut self, exchange: &Exchange) {
         let surfaces = exchange.body_surfaces();
-        if self.shapes.len() != surfaces.len() {
+        let known = self.shapes.iter().zip(surfaces).all(|(known, surface)| Arc::ptr_eq(known, &surface.solid));
+        if self.shapes.len() != surfaces.len() || !known {
             self.shapes = surfaces.iter().map(|surface| surface.solid.clone()).collect();
             self.pairs = self.pairs_of(self.solids.iter().chain(self.shapes.iter().map(|shape| &**shape)));
         }
@@ -210,7 +211,7 @@ impl Walls {
                 for surface in 0..surfaces {
                     let body = surface.checked_sub(walls.solids.len()).map(|k| &walls.bodies[k].visit);
                     let reach = radius + slack;
-                    if body.is_some_and(|visit| (p - visit.state.position).norm() > visit.reach + reach) {
+                    if body.is_some_and(|visit| !visit.state.present || (p - visit.state.position).norm() > visit.reach + reach) {
                         continue;
                     }
                     let mut near = false;

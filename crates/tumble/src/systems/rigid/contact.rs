@@ -77,11 +77,18 @@ pub struct Bodies {
 }
 
 impl Bodies {
-    fn hull(&self, i: usize) -> &Hull {
+    /// The surface of a body.
+    pub fn hull(&self, i: usize) -> &Hull {
         &self.hulls[self.hull[i] as usize]
     }
 
-    fn pose(&self, i: usize) -> Pose {
+    /// Whether there is a body in a row: those of the unborn, and of pieces that hang on others, have no mass.
+    pub fn is_there(&self, i: usize) -> bool {
+        i >= self.moving || self.rows[i].inverse_mass > 0.0
+    }
+
+    /// Where the surface of a body is.
+    pub fn pose(&self, i: usize) -> Pose {
         pose(self.rows[i].x, self.rows[i].q) * self.hull(i).place
     }
 }
@@ -252,11 +259,14 @@ fn margin(bodies: &Bodies, i: usize, h: f64) -> f64 {
 fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
     let n = bodies.rows.len();
     let bounds = |i: usize| {
+        if !bodies.is_there(i) {
+            return [V::ZERO; 2];
+        }
         let Aabb { mins, maxs } = bodies.hull(i).shape.compute_aabb(&bodies.pose(i));
         [mins - V::splat(margins[i]), maxs + V::splat(margins[i])]
     };
     let bounds: Vec<[V; 2]> = fold(n, |range| range.map(bounds).collect::<Vec<_>>()).concat();
-    let mut order: Vec<usize> = (0..n).collect();
+    let mut order: Vec<usize> = (0..n).filter(|i| bodies.is_there(*i)).collect();
     order.sort_by(|a, b| bounds[*a][0].x.total_cmp(&bounds[*b][0].x).then(a.cmp(b)));
     let mut found = Vec::new();
     for (k, &i) in order.iter().enumerate() {

@@ -3,21 +3,28 @@
 //!   m v' = m g + sum of p,   L' = sum of r × p,   x' = v,   q' = (0, ω) q / 2                                            (rigid.1)
 //!
 //! Each sub-step: gravity; contacts that may close; bounces; soft passes; bodies move and turn; rigid passes. Of bodies that joints hold and no
-//! contact, half of gravity acts before they move, half after (see `joint`). Bodies are in double precision in both engines, and contacts in the
+//! contact, half of gravity acts before they move, half after (see `joint`). Rows are there from the start: bodies that are born (`birth`) and
+//! pieces that break off (`fracture`) fill those that are kept for them. Bodies are in double precision in both engines, and contacts in the
 //! order of their pairs, so that a far body changes no bit.
 
+mod birth;
 mod body;
 mod contact;
 mod direct;
+mod fracture;
+mod glue;
 mod joint;
 mod lever;
+mod pattern;
 mod solids;
 mod solve;
 mod wide;
 
+pub use birth::{Birth, any_turn};
 pub use body::Body;
 pub use contact::{Bodies, Hull, pose};
 pub use joint::{Drive, Joint, Kind, Motor, WORLD};
+pub use pattern::{Bond, Frame, Pattern, Piece, Weight, steiner};
 pub use solids::refusal;
 
 use crate::exchange::{BodyState, Push, Turn, When};
@@ -26,7 +33,9 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::{Quat, Real};
 use crate::system::{Archive, Part, System};
+use birth::Births;
 use contact::{CONTACT, Contact, Near};
+use fracture::{Cracked, Fractures};
 use joint::Joints;
 use lever::Pace;
 use std::ops::Range;
@@ -48,10 +57,21 @@ const JOINT: usize = 7;
 pub struct Object {
     /// Its name.
     pub name: String,
-    /// Its bodies.
+    /// Its bodies, those that are born later last; of those that break the pieces of each side by side.
     pub rows: Range<usize>,
     /// Their surface for pictures, in their own axes.
     pub mesh: Mesh,
+    /// How they are born, if that is during the run.
+    pub birth: Option<Birth>,
+    /// How they break, if they do, and the first of their surfaces at the exchange, if others touch them.
+    pub pattern: Option<(Arc<Pattern>, Option<usize>)>,
+}
+
+impl Object {
+    /// Rows of a body: one, or one of each piece.
+    fn each(&self) -> usize {
+        self.pattern.as_ref().map_or(1, |(pattern, _)| pattern.pieces.len())
+    }
 }
 
 /// Joints of one kind.
@@ -80,10 +100,14 @@ pub struct Settings {
 pub struct Rigid {
     settings: Settings,
     objects: Vec<Object>,
+    births: Vec<Births>,
+    fractures: Fractures,
     bodies: Bodies,
     ends: Vec<Ends>,
     joints: Joints,
     contacts: Vec<Contact>,
+    /// What this interval knows of pairs.
+    near: Near,
     /// Of constant forces, over this interval.
     steady: Vec<Push>,
     /// The solids of others, and of each body beyond those that move which one it is.
@@ -92,10 +116,27 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// Bodies that move, and their objects; joints, and theirs.
+    /// Bodies that move, and their objects; joints, and theirs. Rows of the unborn, and of all pieces but the first, have [`Body::WORLD`].
     pub fn new(settings: Settings, objects: Vec<Object>, bodies: Bodies, ends: Vec<Ends>, joints: Vec<Joint>) -> Self {
-        let joints = Joints::new(joints, bodies.moving);
-        Self { settings, objects, bodies, ends, joints, contacts: Vec::new(), steady: Vec::new(), solids: Arc::default(), of: Vec::new() }
+        let cracked = objects.iter().filter_map(|object| Some((object.rows.clone(), &object.pattern.as_ref()?.0)));
+        let cracked =
+            cracked.flat_map(|(rows, pattern)| rows.step_by(pattern.pieces.len()).map(|first| Cracked::new(pattern.clone(), first)));
+        let fractures = Fractures::new(cracked.collect(), &joints);
+        let born = |object: &Object| Births { born: if object.birth.is_some() { 0 } else { object.rows.len() / object.each() }, tried: 0 };
+        Self {
+            births: objects.iter().map(born).collect(),
+            joints: Joints::new(joints, bodies.moving),
+            settings,
+            objects,
+            fractures,
+            bodies,
+            ends,
+            contacts: Vec::new(),
+            near: Near::default(),
+            steady: Vec::new(),
+            solids: Arc::default(),
+            of: Vec::new(),
+        }
     }
 
     /// The two surfaces that overlap most at the start, by more than round-off, the index of the first, if its object has several, and how deep [m].
@@ -104,8 +145,8 @@ impl Rigid {
         let found = Near::default().contacts(&self.bodies, 0.0, &self.joints.apart()).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
         let [a, b] = found.pair.map(|i| i as usize);
         let least = OVERLAP * self.bodies.hulls[self.bodies.hull[a] as usize].reach;
-        let (object, index) = self.owner(a)?;
-        let index = (object.rows.len() > 1).then_some(index);
+        let (object, row) = self.owner(a)?;
+        let index = (object.rows.len() > object.each()).then_some(row / object.each());
         (-found.gap > least).then_some((&object.name, index, self.named(b)?, -found.gap))
     }
 
@@ -117,9 +158,56 @@ impl Rigid {
         }
     }
 
-    /// Object of a body that moves, and its index there.
+    /// Name in frames of the object of a body that moves, and its index there.
+    fn place(&self, row: usize) -> Option<(String, usize)> {
+        let (object, row) = self.owner(row)?;
+        let (index, piece) = (row / object.each(), row % object.each());
+        Some((if object.pattern.is_some() { piece_name(object, piece) } else { object.name.clone() }, index))
+    }
+
+    /// Object of a body that moves, and its row there.
     fn owner(&self, row: usize) -> Option<(&Object, usize)> {
         self.objects.iter().find(|object| object.rows.contains(&row)).map(|object| (object, row - object.rows.start))
+    }
+
+    /// Rows of an object up to the last body that has been born.
+    fn born(&self, k: usize) -> Range<usize> {
+        let object = &self.objects[k];
+        object.rows.start..object.rows.start + self.births[k].born * object.each()
+    }
+
+    /// Bodies are born that are due at a time [s] and find room.
+    fn bear(&mut self, t: f64) {
+        for k in 0..self.objects.len() {
+            let (object, births) = (&self.objects[k], &mut self.births[k]);
+            let Some(birth) = &object.birth else { continue };
+            while births.born < birth.due(t) {
+                let row = object.rows.start + births.born * object.each();
+                let Some(body) = birth.next(births, &self.bodies, row) else { break };
+                self.bodies.rows[row] = body;
+                births.born += 1;
+                self.near = Near::default();
+            }
+        }
+    }
+
+    /// Bodies fall apart whose glue this sub-step of h [s] has loaded too much.
+    fn crack(&mut self, blows: &[solve::Blow], h: f64) {
+        if self.fractures.all.is_empty() {
+            return;
+        }
+        let fallen = self.fractures.crack(&mut self.bodies, &self.contacts, blows, &self.joints.all, h);
+        if !fallen.is_empty() {
+            self.near = Near::default();
+            self.fractures.hold(&mut self.joints.all);
+            let stays = |i: u32| fallen.iter().all(|fallen| fallen.row != i as usize);
+            self.contacts.retain(|contact| contact.pair.into_iter().all(stays));
+            for fallen in &fallen {
+                let (own, others): (Vec<Push>, Vec<Push>) = self.steady.drain(..).partition(|push| push.row == fallen.row);
+                self.steady = others;
+                self.steady.extend(own.iter().flat_map(|push| fallen.share(&self.bodies.rows, push)));
+            }
+        }
     }
 
     fn steps(&self, dt: f64) -> u32 {
@@ -198,19 +286,20 @@ impl Rigid {
     }
 
     /// A sub-step of h seconds; constant forces through the centres of bodies have changed their velocities by `gains` for it.
-    fn step(&mut self, t: f64, h: f64, gains: &[Vector], near: &mut Near) {
+    fn step(&mut self, t: f64, h: f64, gains: &[Vector]) {
         self.place_solids(t, h);
+        self.bear(t);
         let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
         let moving = self.bodies.moving;
-        for body in &mut self.bodies.rows[..moving] {
+        for body in self.bodies.rows[..moving].iter_mut().filter(|body| body.inverse_mass > 0.0) {
             body.orient();
             body.v = body.v + gravity * h;
         }
-        let mut contacts = near.contacts(&self.bodies, h, &self.joints.apart());
+        let mut contacts = self.near.contacts(&self.bodies, h, &self.joints.apart());
         contact::carry(&self.bodies, &self.contacts, &mut contacts);
         let pace = Pace { t, h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
         let rows = &mut self.bodies.rows;
-        solve::bounce(rows, &contacts, &pace);
+        let blows = solve::bounce(rows, &contacts, &pace);
         // What joints hold and no contact has half of gravity before it moves.
         let mut hangs = vec![false; rows.len()];
         self.joints.held().for_each(|i| hangs[i as usize] = true);
@@ -222,7 +311,8 @@ impl Rigid {
             let mut held = vec![false; rows.len()];
             joints.held().for_each(|i| held[i as usize] = true);
             contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| held[i as usize] = true);
-            for (((body, held), hangs), gain) in rows[..moving].iter_mut().zip(held).zip(hangs).zip(gains) {
+            let all = rows[..moving].iter_mut().zip(held).zip(hangs).zip(gains);
+            for (((body, held), hangs), gain) in all.filter(|(((body, _), _), _)| body.inverse_mass > 0.0) {
                 body.x = body.x + body.v * h - if held { Vector::default() } else { (gravity * h + *gain) * (0.5 * h) };
                 body.turn_freely(h);
                 body.orient();
@@ -230,6 +320,7 @@ impl Rigid {
             }
         });
         self.contacts = contacts;
+        self.crack(&blows, h);
     }
 
     /// Which bodies a solid or the world holds, directly or by other bodies; all others fall, whatever they do to each other.
@@ -282,6 +373,30 @@ impl Rigid {
         feet.into_iter().map(support).collect()
     }
 
+    /// Rows have the masses of those that are there, as births and broken bonds say.
+    fn fill(&mut self, mut broken: &[u8]) {
+        for k in 0..self.objects.len() {
+            let born = self.born(k);
+            let object = &self.objects[k];
+            if let (Some(birth), None) = (&object.birth, &object.pattern) {
+                for row in object.rows.clone() {
+                    let body = &mut self.bodies.rows[row];
+                    let like = if born.contains(&row) { &birth.like } else { &Body::WORLD };
+                    (body.inverse_mass, body.inertia) = (like.inverse_mass, like.inertia);
+                    body.inverse_inertia = [0.0; 6];
+                }
+            }
+        }
+        let ends: Vec<Range<usize>> = (0..self.objects.len()).map(|k| self.born(k)).collect();
+        for cracked in &mut self.fractures.all {
+            let (own, rest) = broken.split_at(cracked.broken.len());
+            broken = rest;
+            let born = ends.iter().any(|rows| rows.contains(&cracked.first));
+            cracked.restore(own.iter().map(|broken| *broken == 1).collect(), born, &mut self.bodies);
+        }
+        self.fractures.hold(&mut self.joints.all);
+    }
+
     fn moving(&self) -> &[Body] {
         &self.bodies.rows[..self.bodies.moving]
     }
@@ -290,7 +405,7 @@ impl Rigid {
         let gravity = Vector::from(self.settings.gravity.at(t));
         let (mut momentum, mut spin, mut speed) = (Vector::default(), Vector::default(), 0.0_f64);
         let mut ledger = Ledger { time: t, ..Ledger::default() };
-        for body in &self.moving()[rows.clone()] {
+        for body in self.moving()[rows.clone()].iter().filter(|body| body.inverse_mass > 0.0) {
             let mass = 1.0 / body.inverse_mass;
             ledger.mass += mass;
             momentum = momentum + body.v * mass;
@@ -324,10 +439,10 @@ impl Rigid {
             _ => None,
         };
         let (row, column) = self.moving().iter().enumerate().find_map(|(i, body)| Some((i, bad(body)?)))?;
-        let (object, index) = self.owner(row)?;
+        let (object, index) = self.place(row)?;
         Some(StepError::NotFinite(Box::new(Breakdown {
             system: self.settings.name.clone(),
-            object: object.name.clone(),
+            object,
             column: column.into(),
             index,
             id: None,
@@ -342,13 +457,35 @@ impl Rigid {
     }
 }
 
+/// Name in frames of a piece of the bodies of an object.
+fn piece_name(object: &Object, piece: usize) -> String {
+    format!("{}.{}", object.name, piece + 1)
+}
+
+/// The columns of bodies.
+fn body_columns(object: &str, bodies: &[Body], names: &[&str], out: &mut Vec<Column>) {
+    let vectors =
+        |f: fn(&Body) -> Vector| -> Vec<Real> { bodies.iter().flat_map(|body| <[f64; 3]>::from(f(body)).map(|c| c as Real)).collect() };
+    for name in names {
+        let data = match *name {
+            "position" => vectors(|body| body.x),
+            "velocity" => vectors(|body| body.v),
+            "angular_velocity" => vectors(|body| body.w),
+            _ => continue,
+        };
+        out.push(Column::new(object, name, data));
+    }
+    let turns: Vec<Real> = bodies.iter().flat_map(|body| body.q.row().map(|c| c as Real)).collect();
+    out.push(Column::new(object, "turn", turns));
+}
+
 impl System for Rigid {
     fn name(&self) -> &str {
         &self.settings.name
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     fn absorb(&mut self, exchange: &mut Turn<'_>) {
@@ -364,7 +501,7 @@ impl System for Rigid {
         let h = dt / f64::from(n);
         self.shift(0.5 * (dt + h));
         let gains = self.gains(1.0 / f64::from(n));
-        let mut near = Near::default();
+        self.near = Near::default();
         for k in 0..n {
             if !go_on() {
                 return Ok(report);
@@ -372,7 +509,7 @@ impl System for Rigid {
             let steady = std::mem::take(&mut self.steady);
             self.push(&steady, 1.0 / f64::from(n));
             self.steady = steady;
-            self.step(t + f64::from(k) * h, h, &gains, &mut near);
+            self.step(t + f64::from(k) * h, h, &gains);
             report.stepped(h);
         }
         self.steady.clear();
@@ -389,6 +526,10 @@ impl System for Rigid {
             for (state, i) in body.states.iter_mut().zip(body.rows.clone()) {
                 let (normal, footing) = if body.detailed { bears[i] } else { Default::default() };
                 let row = &mut self.bodies.rows[i];
+                if row.inverse_mass == 0.0 {
+                    *state = BodyState { present: false, ..BodyState::default() };
+                    continue;
+                }
                 row.orient();
                 *state = BodyState {
                     position: row.x,
@@ -401,28 +542,33 @@ impl System for Rigid {
                     borne: body.detailed && borne[i],
                     normal,
                     footing,
+                    present: true,
                 };
+            }
+        }
+        let firsts = self.objects.iter().filter_map(|object| Some((object.rows.start, object.pattern.as_ref()?.1?)));
+        let firsts: Vec<(usize, usize)> = firsts.collect();
+        for cracked in self.fractures.all.iter_mut().filter(|cracked| cracked.fresh) {
+            cracked.fresh = false;
+            let Some((row, cover)) = firsts.iter().rfind(|(row, _)| *row <= cracked.first) else { continue };
+            for (k, (solid, reach, volume)) in cracked.covers.iter().enumerate() {
+                exchange.cover_anew(cover + cracked.first - row + k, solid, *reach, *volume);
             }
         }
     }
 
     fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
-        for Object { name: object, rows, .. } in &self.objects {
-            let bodies = &self.moving()[rows.clone()];
-            let vectors = |f: fn(&Body) -> Vector| -> Vec<Real> {
-                bodies.iter().flat_map(|body| <[f64; 3]>::from(f(body)).map(|c| c as Real)).collect()
+        for (k, object) in self.objects.iter().enumerate() {
+            let Some((pattern, _)) = &object.pattern else {
+                body_columns(&object.name, &self.moving()[self.born(k)], names, out);
+                continue;
             };
-            for name in names {
-                let data = match *name {
-                    "position" => vectors(|body| body.x),
-                    "velocity" => vectors(|body| body.v),
-                    "angular_velocity" => vectors(|body| body.w),
-                    _ => continue,
-                };
-                out.push(Column::new(object, name, data));
+            let first = self.fractures.all.partition_point(|cracked| cracked.first < object.rows.start);
+            for piece in 0..pattern.pieces.len() {
+                let of = self.fractures.all[first..first + self.births[k].born].iter();
+                let bodies: Vec<Body> = of.map(|cracked| cracked.piece(&self.bodies.rows, piece)).collect();
+                body_columns(&piece_name(object, piece), &bodies, names, out);
             }
-            let turns: Vec<Real> = bodies.iter().flat_map(|body| body.q.row().map(|c| c as Real)).collect();
-            out.push(Column::new(object, "turn", turns));
         }
         for Ends { name: object, joints } in &self.ends {
             // The first body's end comes first. Those of what has broken are in one place, where nobody sees them.
@@ -446,11 +592,20 @@ impl System for Rigid {
     }
 
     fn topology(&self, out: &mut Vec<Column>) {
-        for Object { name, rows, mesh } in &self.objects {
+        let mut of = |name: &str, mesh: &Mesh, mass: f64, count: usize| {
             out.push(Column::new(name, "vertices", mesh.vertices.concat()));
             out.push(Column::new(name, "triangles", mesh.triangles.concat()));
-            let masses: Vec<Real> = self.moving()[rows.clone()].iter().map(|body| (1.0 / body.inverse_mass) as Real).collect();
-            out.push(Column::new(name, "mass", masses));
+            out.push(Column::new(name, "mass", vec![mass as Real; count]));
+        };
+        for object in &self.objects {
+            let Some((pattern, _)) = &object.pattern else {
+                let body = object.birth.as_ref().map_or(&self.bodies.rows[object.rows.start], |birth| &birth.like);
+                of(&object.name, &object.mesh, 1.0 / body.inverse_mass, object.rows.len());
+                continue;
+            };
+            for (k, piece) in pattern.pieces.iter().enumerate() {
+                of(&piece_name(object, k), &piece.mesh, piece.weight.mass, object.rows.len() / object.each());
+            }
         }
         for Ends { name, joints } in &self.ends {
             let lines = |joint: &Joint| matches!(joint.kind, Kind::Rope(_) | Kind::Spring(_) | Kind::Slider);
@@ -462,8 +617,9 @@ impl System for Rigid {
 
     fn ledger(&self, t: f64) -> Ledger {
         let elastic = self.joints.all.iter().map(|joint| joint.energy(&self.bodies.rows, t)).sum();
-        let broken = self.joints.all.iter().filter(|joint| joint.broken).count() as u64;
-        Ledger { elastic, broken: (!self.ends.is_empty()).then_some(broken), ..self.ledger_of(0..self.bodies.moving, t) }
+        let broken = self.joints.all.iter().filter(|joint| joint.broken).count() as u64 + self.fractures.broken();
+        let breaks = !self.ends.is_empty() || !self.fractures.all.is_empty();
+        Ledger { elastic, broken: breaks.then_some(broken), ..self.ledger_of(0..self.bodies.moving, t) }
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
@@ -477,9 +633,9 @@ impl System for Rigid {
 
     fn worst(&self, _t: f64) -> Vec<Worst> {
         let of = |measure, value, row: usize, other: Option<usize>| {
-            let (object, index) = self.owner(row)?;
+            let (object, index) = self.place(row)?;
             let other = other.and_then(|row| self.named(row)).map(str::to_string);
-            Some(Worst { measure, value, object: object.name.clone(), other, particles: vec![index], id: None, cell: None })
+            Some(Worst { measure, value, object, other, particles: vec![index], id: None, cell: None })
         };
         let speeds = self.moving().iter().map(|body| body.v.norm()).enumerate();
         let fastest = speeds.max_by(|a, b| a.1.total_cmp(&b.1)).and_then(|(row, speed)| of("speed", speed, row, None));
@@ -507,16 +663,23 @@ impl System for Rigid {
         archive.push("contacts", Part::Numbers(self.contacts.iter().flat_map(Contact::numbers).collect()));
         let joint = |j: &Joint| [&[f64::from(u8::from(j.broken))][..], &three(j.load[0]), &three(j.load[1])].concat();
         archive.push("joints", Part::Numbers(self.joints.all.iter().flat_map(joint).collect()));
+        let births: Vec<u32> = self.births.iter().flat_map(|births| [births.born as u32, births.tried]).collect();
+        archive.push_indices("births", &births);
+        let broken: Vec<u8> = self.fractures.all.iter().flat_map(|cracked| &cracked.broken).map(|broken| u8::from(*broken)).collect();
+        archive.push("broken", Part::Bytes(broken));
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let (bodies, pairs, contacts) = (archive.numbers("bodies")?, archive.indices("pairs")?, archive.numbers("contacts")?);
         let joints = archive.numbers("joints")?;
+        let (births, broken) = (archive.indices("births")?, archive.bytes("broken")?);
         // Of an interval that was cut short.
         self.steady.clear();
         if bodies.len() != BODY * self.bodies.moving
             || contacts.len() * 2 != CONTACT * pairs.len()
             || joints.len() != JOINT * self.joints.all.len()
+            || births.len() != 2 * self.births.len()
+            || broken.len() != self.fractures.all.iter().map(|cracked| cracked.broken.len()).sum::<usize>()
         {
             return None;
         }
@@ -526,6 +689,10 @@ impl System for Rigid {
             body.q = Quat { v: three(&s[3..]), w: s[6] };
             (body.v, body.w) = (three(&s[7..]), three(&s[10..]));
         }
+        for (own, s) in self.births.iter_mut().zip(births.chunks_exact(2)) {
+            *own = Births { born: s[0] as usize, tried: s[1] };
+        }
+        self.fill(&broken);
         for (joint, s) in self.joints.all.iter_mut().zip(joints.chunks_exact(JOINT)) {
             (joint.broken, joint.load) = (s[0] == 1.0, [three(&s[1..]), three(&s[4..])]);
         }
@@ -535,7 +702,11 @@ impl System for Rigid {
     }
 
     fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
-        let rows = self.objects.iter().find(|o| o.name == object)?.rows.clone();
+        let k = self.objects.iter().position(|o| o.name == object)?;
+        let rows = self.born(k);
+        if self.objects[k].pattern.is_some() {
+            return Some(false);
+        }
         let width = if column == "turn" { 4 } else { 3 };
         if !matches!(column, "position" | "velocity" | "angular_velocity" | "turn") || values.len() != width * rows.len() {
             return Some(false);

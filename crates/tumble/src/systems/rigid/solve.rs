@@ -83,19 +83,31 @@ impl Row {
     }
 }
 
+/// An impulse of a bounce on the second of two bodies [N s], at these arms.
+pub struct Blow {
+    /// The bodies.
+    pub pair: [u32; 2],
+    /// Ways from their centres [m].
+    pub arms: [Vector; 2],
+    /// The impulse [N s].
+    pub impulse: Vector,
+}
+
 /// Bounces: each pair that closes within the sub-step turns its approach round, one pair after the other until none approaches.
-pub fn bounce(bodies: &mut [Body], contacts: &[Contact], pace: &Pace) {
+pub fn bounce(bodies: &mut [Body], contacts: &[Contact], pace: &Pace) -> Vec<Blow> {
+    let mut blows = Vec::new();
     let elastic: Vec<&[Contact]> = contacts.chunk_by(|a, b| a.pair == b.pair).filter(|points| points[0].restitution > 0.0).collect();
     for round in 0..ROUNDS {
-        let hits = elastic.iter().map(|points| u32::from(hit(bodies, points, round == 0, pace))).sum::<u32>();
+        let hits = elastic.iter().map(|points| u32::from(hit(bodies, points, round == 0, pace, &mut blows))).sum::<u32>();
         if hits == 0 {
             break;
         }
     }
+    blows
 }
 
 /// A bounce of a pair at all its points that close within the sub-step; `false` if there are none. In the first round it has its time.
-fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> bool {
+fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace, blows: &mut Vec<Blow>) -> bool {
     let index = points[0].pair;
     let pair = index.map(|i| bodies[i as usize]);
     let [a, b] = &pair;
@@ -148,6 +160,12 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
         body.x = body.x - (twist.v - body.v) * t;
         (body.v, body.w) = (twist.v, twist.w);
     }
+    let blow = |(row, (c, _)): (&Row, &(&Contact, f64))| Blow {
+        pair: index,
+        arms: c.arms,
+        impulse: row.normal.along * row.press + row.across[0].along * row.drag[0] + row.across[1].along * row.drag[1],
+    };
+    blows.extend(rows.iter().zip(&closing).map(blow));
     true
 }
 
