@@ -28,6 +28,7 @@ BEGINNINGS = {
     "coupled/curtain": 20,
     "coupled/gust": 12,
     "coupled/sandbox": 20,
+    "coupled/washing": 16,
     "drape/clamped-sheet": 32,
     "drape/sheet-on-ball": 16,
     "drape/sheet-on-bunny": 4,

@@ -27,6 +27,7 @@ const AT: Record<string, number> = {
   "cloth/torn-flag": 60,
   "cloth/twist": 60,
   "coupled/afloat": 14,
+  "coupled/washing": 60,
   "coupled/cart": 14,
   "coupled/curtain": 14,
   "coupled/gust": 24,
