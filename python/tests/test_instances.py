@@ -157,3 +157,41 @@ def test_bodies_of_a_simulation(tmp_path: Path) -> None:
         turning = np.degrees(run.frame(i)["boxes"]["angular_velocity"])
         np.testing.assert_allclose(bodies.GetAngularVelocitiesAttr().Get(i), turning, rtol=1e-6, atol=1e-6)
     assert "'boxes_mesh': {" in blender.write(run, tmp_path).read_text()
+
+
+def test_bodies_that_are_born_or_break_are_in_pictures_and_stages(tmp_path: Path) -> None:
+    """Two are born one after the other; a box falls apart into four pieces, which are objects of their own."""
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom
+
+    from tumble.export import usd
+
+    box = {"box": {"size": [0.2, 0.2, 0.2]}}
+    emit = {"rate": 12, "count": 2, "velocity": [3, 0, 0], "from": {"point": {"at": [0, 0, 2]}}}
+    fracture = {"pieces": 4, "strength": 1e3}
+    scene = {
+        "version": 1,
+        "time": {"frames": 6},
+        "body": [
+            {"name": "rocks", "shape": box, "emit": emit},
+            {"name": "vase", "shape": box, "position": [[0, 0, 0.15]], "velocity": [[0, 0, -5]], "fracture": fracture},
+        ],
+        "joint": [{"name": "pin", "between": ["vase"], "kind": {"rope": {"length": 9, "to": [0, 0, 9]}}}],
+        "collider": [{"name": "floor", "shape": {"floor": {}}}],
+    }
+    run = simulate(Scene(scene, tmp_path), tmp_path / "run")
+    pieces = [f"vase.{k}" for k in range(1, 5)]
+    assert [look.object for look in run.looks.objects] == ["rocks", *pieces, "pin", "floor"]
+    counts = [len(run.frame(i)["rocks"]["position"]) for i in range(run.n_frames)]
+    assert counts[0] == 0 and counts[-1] == 2 and 1 in counts
+    stage = Usd.Stage.Open(str(usd.write(run, tmp_path)))
+    bodies = UsdGeom.PointInstancer(stage.GetPrimAtPath("/scene/rocks"))
+    shown = Stage(run)
+    for i, n in enumerate(counts):
+        assert len(bodies.GetPositionsAttr().Get(i)) == len(bodies.GetProtoIndicesAttr().Get(i)) == n
+        assert list(bodies.GetIdsAttr().Get(i)) == list(range(n)) and len(bodies.GetOrientationsAttr().Get(i)) == n
+        meshes = {thing.name: thing for thing in shown.things(i) if isinstance(thing, Mesh)}
+        assert len(meshes["rocks"].triangles) == 12 * n and all(len(meshes[name].triangles) for name in pieces)
+    places = np.concatenate([run.frame(run.n_frames - 1)[name]["velocity"] for name in pieces])
+    assert np.ptp(places, axis=0).max() > 0.1
+    assert all(stage.GetPrimAtPath(f"/scene/vase_{k}").IsValid() for k in range(1, 5))
