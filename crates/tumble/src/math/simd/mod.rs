@@ -522,13 +522,13 @@ pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
     {
         let most = WIDEST.load(Ordering::Relaxed);
         let level = if level as u8 <= most { level } else { held(most) };
-        if let (false, Level::Avx512, Some(simd)) = (QUICK, level, x86::avx512()) {
+        if !QUICK && let (Level::Avx512, Some(simd)) = (level, x86::avx512()) {
             return Simd::vectorize(simd, x86::InAvx512 { kernel, simd });
         }
         if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::avx2()) {
             return Simd::vectorize(simd, x86::InAvx2 { kernel, simd });
         }
-        if let (false, Level::Narrow | Level::Avx2 | Level::Avx512, Some(simd)) = (QUICK, level, x86::sse()) {
+        if !QUICK && let (Level::Narrow | Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::sse()) {
             return Simd::vectorize(simd, x86::InSse { kernel, simd });
         }
     }
