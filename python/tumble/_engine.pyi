@@ -54,6 +54,8 @@ class Ledger(TypedDict):
     """Fastest mass, or fastest flow of a fluid [m/s]."""
     contacts: int | None
     """Masses that touch a collider."""
+    waiting: int | None
+    """Births that are due, and wait for room."""
     broken: int | None
     """Links broken so far."""
     heat: float | None

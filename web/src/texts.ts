@@ -109,6 +109,7 @@ export const TEXTS: Record<string, string> = {
   "pressure.iterations": "The solver gives up after so many.",
   "self_contact.thickness": "Distance at which two layers touch.",
   "rigid.iterations": "Passes over all contacts in a sub-step. High piles need more; more sub-steps help most.",
+  "grains.scheme": "Forces of springs, or hard grains that are moved apart: faster, and less exact.",
   "grains.law": "How the force follows from the overlap.",
   "position_based.iterations": "Sweeps over all elements in a sub-step. More sub-steps help more than more sweeps.",
   "position_based.tethers": "Nothing hangs farther below its pins than this multiple of the way along the cloth.",

@@ -178,7 +178,7 @@ fn a_dumbbell_falls_over_in_the_time_that_its_inertia_says() {
 
 #[test]
 fn heaps_of_clumps_are_steeper_than_those_of_spheres() {
-    let slope = |clump: &str, count: usize| granular::slope(&format!("{clump}\nfriction = 0.4"), count);
+    let slope = |clump: &str, count: usize| granular::slope(granular::FORCES, &format!("{clump}\nfriction = 0.4"), count);
     let spheres = slope("", 800);
     let [dumbbells, tetrahedra] =
         [("dumbbell", 400), ("tetrahedron", 200)].map(|(clump, count)| slope(&format!("clump = \"{clump}\""), count));

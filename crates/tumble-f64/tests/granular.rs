@@ -13,8 +13,15 @@ use tumble_interface::Engine;
 const R: f64 = 0.0025;
 const DENSITY: f64 = 2500.0;
 
-fn scene(words: &str) -> Simulation {
-    simulation(&format!("time.fps = 50\nworld.gravity = [0, 0, -9.81]\n{words}"))
+/// Words of a system whose contacts act by forces, and by positions.
+pub const FORCES: &str = "";
+pub const POSITIONS: &str = "grains.scheme = \"positions\"\n";
+
+/// A scene of grains in a system with these words; those that are moved by positions have no stiffness.
+fn scene(system: &str, words: &str) -> Simulation {
+    let said = |line: &&str| !system.starts_with(POSITIONS) || !line.starts_with("young");
+    let words: String = words.lines().filter(said).flat_map(|line| [line, "\n"]).collect();
+    simulation(&format!("time.fps = 50\nworld.gravity = [0, 0, -9.81]\n[[system]]\nmethod = \"grains\"\n{system}{words}"))
 }
 
 /// Grains of this friction in boxes, each given by its centre and size.
@@ -38,7 +45,7 @@ fn quantile(mut numbers: Vec<f64>, part: f64) -> f64 {
 
 /// A column of 16 grains' width between two panes: its height over its width when it has settled, and then, when the gate has gone and the avalanche
 /// has stopped, the run-out and the height over the width before. Its edge is where it is a grain deep: single ones roll on.
-fn collapse(friction: f64, rolling: f64) -> [f64; 3] {
+pub fn collapse(system: &str, friction: f64, rolling: f64) -> [f64; 3] {
     const WIDTH: f64 = 0.08;
     const DEPTH: f64 = 0.02;
     const BIN: f64 = 0.01;
@@ -50,7 +57,7 @@ fn collapse(friction: f64, rolling: f64) -> [f64; 3] {
     );
     let more = format!("rolling_friction = {rolling}\nradius_spread = 0.1");
     let words = sand(friction, &more, &[[[0.5 * WIDTH, 0.0, 0.165], [WIDTH, DEPTH, 0.33]]]);
-    let mut sim = scene(&[words, floor, gate, panes].concat());
+    let mut sim = scene(system, &[words, floor, gate, panes].concat());
     run(&mut sim, 30);
     let height = |sim: &Simulation| quantile(positions(sim, "sand").iter().map(|p| p.z).collect(), 0.995) + R;
     let before = height(&sim) / WIDTH;
@@ -67,28 +74,34 @@ fn collapse(friction: f64, rolling: f64) -> [f64; 3] {
 #[ignore = "long: make validate"]
 fn a_column_of_glass_beads_collapses_as_far_as_measured_and_others_do_not() {
     // [lube2005]: 1.2 a, [lajeunesse2005]: 1.8 a; the height about a^0.4, between 0.8 and 1.7.
-    let [a, far, high] = collapse(0.2, 0.0);
+    let [a, far, high] = collapse(FORCES, 0.2, 0.0);
     assert!((1.7..2.2).contains(&a), "{a}");
     assert!((1.2 * a..1.8 * a).contains(&far) && (0.8..1.7).contains(&high), "a = {a}: {far} of {} to {}, {high}", 1.2 * a, 1.8 * a);
     // Without friction all runs to the far wall; angular grains stop short.
-    let [_, slips, _] = collapse(0.0, 0.0);
-    let [_, short, higher] = collapse(0.5, 0.1);
+    let [_, slips, _] = collapse(FORCES, 0.0, 0.0);
+    let [_, short, higher] = collapse(FORCES, 0.5, 0.1);
     assert!(slips > 10.0 && short < 1.1 * a && higher > high, "{slips} {far} {short}, {high} {higher}");
 }
 
-#[test]
-fn poured_balls_pack_as_densely_as_random_ones() {
+/// The part of the volume that balls without friction fill, poured into a bin, and how deep they overlap, over their radius.
+pub fn packing(system: &str) -> [f64; 2] {
     let side = 24.0 * R;
     let bin = format!(
         "[[collider]]\nname = \"bin\"\nshape = {{ box = {{ center = [0, 0, 0.2], size = [{side}, {side}, 0.4] }} }}\ninside = true\nfriction = 0\n"
     );
-    let mut sim = scene(&(sand(0.0, "", &[[[0.0, 0.0, 0.1], [side, side, 0.2]]]) + &bin));
+    let mut sim = scene(system, &(sand(0.0, "", &[[[0.0, 0.0, 0.1], [side, side, 0.2]]]) + &bin));
     run(&mut sim, 50);
     let inner = 0.5 * side - 6.0 * R;
     let within = |p: &&Vector| p.x.abs() < inner && p.y.abs() < inner && (6.0 * R..22.0 * R).contains(&p.z);
     let count = positions(&sim, "sand").iter().filter(within).count() as f64;
-    let part = count * 4.0 / 3.0 * PI * R.powi(3) / (4.0 * inner * inner * 16.0 * R);
-    assert!(count > 100.0 && (0.6..0.66).contains(&part), "{part}, {count}");
+    assert!(count > 100.0, "{count}");
+    [count * 4.0 / 3.0 * PI * R.powi(3) / (4.0 * inner * inner * 16.0 * R), sim.ledger().penetration.unwrap() / R]
+}
+
+#[test]
+fn poured_balls_pack_as_densely_as_random_ones() {
+    let [part, _] = packing(FORCES);
+    assert!((0.6..0.66).contains(&part), "{part}");
 }
 
 /// Four walls around a square of this width [m], from `low` [m] on.
@@ -105,7 +118,7 @@ fn walls(width: f64, low: f64, more: &str) -> String {
 
 /// The slope of a heap that so many grains make when the walls around them are lifted: of a cone, twice the mean height over the mean distance from the
 /// axis.
-pub fn slope(words: &str, count: usize) -> f64 {
+pub fn slope(system: &str, words: &str, count: usize) -> f64 {
     const RADIUS: f64 = 0.004;
     let heap = format!(
         "[[grains]]\nname = \"heap\"\nradius = {RADIUS}\n{words}\nradius_spread = 0.05\nfill = [{{ center = [0, 0, 0.4], size = [0.09, 0.09, 0.8], count = {count} }}]\nyoung = 1e6\nrestitution = 0.2\n"
@@ -113,7 +126,7 @@ pub fn slope(words: &str, count: usize) -> f64 {
     let lifted = "friction = 0\nmotion.keys = [{ time = 0.4 }, { time = 0.7, translate = [0, 0, 1] }]";
     let pipe = walls(0.1, 0.0, lifted);
     let floor = "[[collider]]\nname = \"floor\"\nshape = { floor = {} }\nfriction = 0\n";
-    let mut sim = scene(&[heap, pipe, floor.into()].concat());
+    let mut sim = scene(system, &[heap, pipe, floor.into()].concat());
     run(&mut sim, 65);
     let x = positions(&sim, "heap");
     let n = x.len() as f64;
@@ -124,7 +137,7 @@ pub fn slope(words: &str, count: usize) -> f64 {
 
 #[test]
 fn heaps_are_the_steeper_the_more_friction_there_is() {
-    let [smooth, medium, rough] = [0.05, 0.2, 0.6].map(|mu| slope(&format!("friction = {mu}\nrolling_friction = 0.1"), 800));
+    let [smooth, medium, rough] = [0.05, 0.2, 0.6].map(|mu| slope(FORCES, &format!("friction = {mu}\nrolling_friction = 0.1"), 800));
     assert!(smooth < 0.1 && medium > 1.5 * smooth && rough > 1.2 * medium && rough < 0.6, "{smooth} {medium} {rough}");
 }
 
@@ -190,7 +203,7 @@ fn flow(hole: f64, filled: f64) -> f64 {
     let gate =
         block("gate", [0.0, 0.0, -0.02], [0.06, 0.06, 0.02], "motion.keys = [{ time = 0.26 }, { time = 0.28, translate = [0.2, 0, 0] }]");
     let fill = [[[0.0, 0.0, 0.5 * filled + 0.003], [WIDTH, WIDTH, filled]]];
-    let mut sim = scene(&[sand(0.5, "radius_spread = 0.1", &fill), floor.concat(), bin, gate].concat());
+    let mut sim = scene(FORCES, &[sand(0.5, "radius_spread = 0.1", &fill), floor.concat(), bin, gate].concat());
     let mut left = |frames: usize| {
         run(&mut sim, frames);
         positions(&sim, "sand").iter().filter(|p| p.z < -0.02).count() as f64

@@ -303,6 +303,8 @@ measures! {
         speed: Option<f64> = Measure { unit: "m/s", about: About::Mass, columns: &["speed"], ..PEAK };
         /// Masses that touch a collider.
         contacts: Option<u64> = Measure { columns: &["contacts"], ..STATE };
+        /// Births that are due, and wait for room.
+        waiting: Option<u64> = Measure { columns: &["waiting"], ..STATE };
         /// Links broken so far.
         broken: Option<u64> = Measure { columns: &["broken"], ..STATE };
         /// Heat in bodies, above that at the start; in a plane for a metre across it.

@@ -31,6 +31,8 @@ export interface Ledger {
   speed: number | null;
   /** Masses that touch a collider. */
   contacts: number | null;
+  /** Births that are due, and wait for room. */
+  waiting: number | null;
   /** Links broken so far. */
   broken: number | null;
   /** Heat in bodies, above that at the start [J]; in a plane for a metre across it. */

@@ -1,6 +1,6 @@
 //! Particles that are born and die.
 
-use super::{Animated, AnimatedVector, MeshFile, Shape};
+use super::{Animated, AnimatedVector, MeshFile, MeshRef, Shape};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -194,6 +194,17 @@ pub enum Source {
     },
 }
 
+impl Source {
+    /// Its mesh, if it has one; `place` is its own in the scene.
+    pub(super) fn mesh_mut(&mut self, place: &str) -> Option<MeshRef<'_>> {
+        match self {
+            Self::MeshSurface(mesh) => Some(MeshRef::mesh(format!("{place}.mesh_surface"), mesh)),
+            Self::MeshVolume(mesh) => Some(MeshRef::mesh(format!("{place}.mesh_volume"), mesh)),
+            _ => None,
+        }
+    }
+}
+
 /// Event in the life of a parent that triggers a burst of children.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -224,6 +235,33 @@ pub enum Cause {
     FasterThan,
     /// It was the oldest and was replaced (`when_full = "replace_oldest"`).
     Replaced,
+}
+
+/// Objects that come in over time, such as grains that are poured. They are born evenly, each where and when there is room for it: those without
+/// wait, and none is lost.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Emit {
+    /// Source: their centres are born in it. Not `particles`.
+    pub from: Source,
+    /// Births per second.
+    #[schemars(extend("x-unit" = "1/s", "exclusiveMinimum" = 0.0))]
+    pub rate: f64,
+    /// Births in all, at most.
+    #[schemars(range(min = 1, max = 100_000_000))]
+    pub count: u32,
+    /// Start of the births.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub start: f64,
+    /// End of the rate; those that wait are still born later. Default: never.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub end: Option<f64>,
+    /// Velocity at birth.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
 }
 
 /// Particles born at once.

@@ -1,6 +1,6 @@
 //! Grains.
 
-use super::{Shape, items_above_zero};
+use super::{Emit, Shape, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,13 +24,16 @@ pub struct Grains {
     /// that heaps are steeper.
     #[serde(default)]
     pub clump: Option<GrainClump>,
-    /// Initial positions; of clumps those of the mean of their spheres, weighted by volume. Alternative: `fill`.
+    /// Initial positions; of clumps those of the mean of their spheres, weighted by volume. Alternatives: `fill`, `emit`.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub position: Vec<[f64; 3]>,
     /// Volumes that are filled at the start, loosely: grains settle to two thirds of the height.
     #[serde(default)]
     pub fill: Vec<GrainFill>,
+    /// Grains that are poured in over time, after those that are there from the start.
+    #[serde(default)]
+    pub emit: Option<Emit>,
     /// Initial rotations of clumps about the x, then the y, then the z axis: one for all, or one for each position. Default: none at positions, any in
     /// fills.
     #[serde(default)]
@@ -48,11 +51,11 @@ pub struct Grains {
     #[serde(default = "stone")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Young's modulus. Real stone has some 5e10 Pa; softer grains flow alike as long as they overlap little, in longer steps.
+    /// Young's modulus. Real stone has some 5e10 Pa; softer grains flow alike as long as they overlap little, in longer steps. Not with scheme `positions`.
     #[serde(default = "soft")]
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
     pub young: f64,
-    /// Poisson's ratio.
+    /// Poisson's ratio. Not with scheme `positions`.
     #[serde(default = "quarter")]
     #[schemars(range(min = 0.0, max = 0.5), extend("x-unit" = "1"))]
     pub poisson: f64,
@@ -74,6 +77,7 @@ pub struct Grains {
     #[schemars(range(min = 0.05, max = 1.0), extend("x-unit" = "1"))]
     pub restitution: f64,
     /// Work of adhesion of two touching surfaces: spheres are pulled off by 2 pi cohesion R1 R2/(R1 + R2). Moist sand sticks with about 0.1 N/m.
+    /// Not with scheme `positions`.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "J/m²"))]
     pub cohesion: f64,
@@ -96,11 +100,23 @@ impl Grains {
         self.radius * (1.0 + self.radius_spread) * self.clump.as_ref().map_or(1.0, GrainClump::reach)
     }
 
+    /// Words that say nothing of hard grains, which are moved by positions, and that are given.
+    pub fn words_of_forces(&self) -> impl Iterator<Item = &'static str> {
+        let given = [
+            ("young", self.young != soft()),
+            ("poisson", self.poisson != quarter()),
+            ("cohesion", self.cohesion != 0.0),
+            ("clump", self.clump.is_some()),
+        ];
+        given.into_iter().filter_map(|(key, given)| given.then_some(key))
+    }
+
     /// How many spheres there are, at most.
     pub fn count(&self) -> f64 {
         let of = |fill: &GrainFill| fill.places(self.spacing()).iter().product::<f64>().min(fill.count.map_or(f64::INFINITY, f64::from));
         let each = self.clump.as_ref().map_or(1, |clump| clump.spheres().len());
-        each as f64 * (self.position.len() as f64 + self.fill.iter().map(of).sum::<f64>())
+        let emitted = self.emit.as_ref().map_or(0.0, |emit| f64::from(emit.count));
+        each as f64 * (self.position.len() as f64 + self.fill.iter().map(of).sum::<f64>() + emitted)
     }
 }
 
@@ -185,8 +201,32 @@ pub enum FillShape {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Granular {
-    /// Force of a contact.
+    /// How contacts act.
+    pub scheme: GrainScheme,
+    /// Force of a contact, with scheme `forces`.
     pub law: NormalLaw,
+}
+
+/// How contacts of grains act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GrainScheme {
+    /// By forces of springs: grains yield as their material does, in steps that resolve each bounce.
+    #[default]
+    Forces,
+    /// By positions: grains are hard, and moved so far that they do not enter each other. In steps of at most 0.5 ms unless given, however stiff grains
+    /// are; a preview of heaps and flows.
+    Positions,
+}
+
+impl GrainScheme {
+    /// The word in the scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Forces => "forces",
+            Self::Positions => "positions",
+        }
+    }
 }
 
 /// How the force of a contact follows from the overlap.

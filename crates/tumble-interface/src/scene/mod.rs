@@ -26,14 +26,14 @@ mod vicsek;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use cloth::{Cloth, Dress, Panel, Seam, Side};
 pub use compressible::Compressible;
-pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
+pub use emitters::{Between, Burst, Cause, Emit, Emitter, Event, Kill, Source, WhenFull};
 pub use fabrics::{FabricRef, FabricUse, FabricWords};
 pub use forces::{Anchor, Field, Force, Goal};
 pub use gas::{
     Advections, Carriage, Densities, ExcessFlow, Fire, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure,
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
-pub use grains::{FillShape, GrainClump, GrainFill, Grains, Granular, NormalLaw};
+pub use grains::{FillShape, GrainClump, GrainFill, GrainScheme, Grains, Granular, NormalLaw};
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
@@ -327,9 +327,7 @@ impl Scene {
 
     /// References to meshes, characters and guides, in order of appearance.
     pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
-        fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
-            MeshRef { content: Content::Mesh, place, path: &file.path, hash: &mut file.hash }
-        }
+        let one = MeshRef::mesh;
         let mut all: Vec<MeshRef<'_>> = Vec::new();
         all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
         for Hair { name, mesh, guides, .. } in &mut self.hair {
@@ -345,12 +343,13 @@ impl Scene {
             let files = shape.mesh_files_mut().into_iter();
             all.extend(files.map(|(key, mesh)| one(format!("body \"{name}\".shape{key}"), mesh)));
         }
-        for Grains { name, fill, .. } in &mut self.grains {
+        for Grains { name, fill, emit, .. } in &mut self.grains {
             for (k, fill) in fill.iter_mut().enumerate() {
                 if let Some(Shape::Mesh(mesh)) = &mut fill.within {
                     all.push(one(format!("grains \"{name}\".fill[{k}].within.mesh"), mesh));
                 }
             }
+            all.extend(emit.as_mut().and_then(|emit| emit.from.mesh_mut(&format!("grains \"{name}\".emit.from"))));
         }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);
@@ -377,11 +376,7 @@ impl Scene {
             }
         }
         for Emitter { name, from, kill, .. } in &mut self.emitter {
-            match from {
-                Source::MeshSurface(mesh) => all.push(one(format!("emitter \"{name}\".from.mesh_surface"), mesh)),
-                Source::MeshVolume(mesh) => all.push(one(format!("emitter \"{name}\".from.mesh_volume"), mesh)),
-                _ => {}
-            }
+            all.extend(from.mesh_mut(&format!("emitter \"{name}\".from")));
             for (i, rule) in kill.iter_mut().enumerate() {
                 match rule {
                     Kill::Inside(Shape::Mesh(mesh)) => all.push(one(format!("emitter \"{name}\".kill[{i}].inside.mesh"), mesh)),

@@ -358,6 +358,13 @@ pub struct MeshRef<'a> {
     pub hash: &'a mut Option<String>,
 }
 
+impl<'a> MeshRef<'a> {
+    /// A mesh that is named at a place of the scene.
+    pub(super) fn mesh(place: String, file: &'a mut MeshFile) -> Self {
+        Self { content: Content::Mesh, place, path: &file.path, hash: &mut file.hash }
+    }
+}
+
 /// A triangle mesh from an OBJ, PLY, STL or GLB file (y up becomes z up in GLB), or outside the browser from USD; scaled, rotated, then translated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

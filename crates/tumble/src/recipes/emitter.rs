@@ -75,6 +75,56 @@ fn refuse_births(
     }
 }
 
+/// What the points of a source are spread over; none of one whose points are particles. `wrong` is told the key and what is wrong there.
+pub fn sampler<'a>(from: &Source, mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>, wrong: &mut dyn FnMut(&str, &str)) -> Option<Sampler> {
+    let vector = |v: &[f64; 3]| Vector::from(*v);
+    let mut sampled = |key: &str, file: &MeshFile, sampler: fn(&Mesh) -> Option<Sampler>, nothing: &str| match mesh(file) {
+        None => {
+            wrong(key, "the mesh has not been loaded");
+            None
+        }
+        Some(mesh) => {
+            let sampler = sampler(&placed(mesh, file));
+            if sampler.is_none() {
+                wrong(key, nothing);
+            }
+            sampler
+        }
+    };
+    match from {
+        Source::Point { at } => Some(Sampler::Point(vector(at))),
+        Source::Curve { points } => {
+            let curve = Sampler::curve(points);
+            if curve.is_none() {
+                wrong(".curve.points", "they are all in one place; use a point");
+            }
+            curve
+        }
+        Source::Disk { normal: [0.0, 0.0, 0.0], .. } => {
+            wrong(".disk.normal", "[0, 0, 0], expected a direction");
+            None
+        }
+        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal).tamed()), *radius)),
+        Source::Sphere { center, radius, surface } => Some(Sampler::Ball(vector(center), *radius, *surface)),
+        Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
+        Source::MeshSurface(file) => sampled(".mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),
+        Source::MeshVolume(file) => {
+            let nothing = "the mesh has no inside; close it, turn its triangles outward, or use mesh_surface";
+            let closed = |mesh: &Mesh| Sampler::volume(mesh);
+            if let Some(Fault { defects, place, cure }) = mesh(file).and_then(Mesh::fault) {
+                let n = defects.open_edges + defects.bad_edges;
+                let message =
+                    format!("the mesh has no inside: {n} edges are open or inconsistent, for example {place}; {cure}, or use mesh_surface");
+                wrong(".mesh_volume", &message);
+                None
+            } else {
+                sampled(".mesh_volume", file, closed, nothing)
+            }
+        }
+        Source::Particles { .. } => None,
+    }
+}
+
 /// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions.
 pub fn emitter<'a>(
     site: &mut Site<'_>,
@@ -118,52 +168,7 @@ pub fn emitter<'a>(
     if let Some((name, b)) = words.columns.iter().find(|(_, b)| b.to.is_some_and(|to| to < b.from)) {
         wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", plain(b.to.unwrap_or_default()), plain(b.from)));
     }
-    let vector = |v: &[f64; 3]| Vector::from(*v);
-    let mut sampled = |key: &str, file: &MeshFile, sampler: fn(&Mesh) -> Option<Sampler>, nothing: &str| match mesh(file) {
-        None => {
-            wrong(key, "the mesh has not been loaded");
-            None
-        }
-        Some(mesh) => {
-            let sampler = sampler(&placed(mesh, file));
-            if sampler.is_none() {
-                wrong(key, nothing);
-            }
-            sampler
-        }
-    };
-    let place = match &words.from {
-        Source::Point { at } => Some(Sampler::Point(vector(at))),
-        Source::Curve { points } => {
-            let curve = Sampler::curve(points);
-            if curve.is_none() {
-                wrong(".from.curve.points", "they are all in one place; use a point");
-            }
-            curve
-        }
-        Source::Disk { normal: [0.0, 0.0, 0.0], .. } => {
-            wrong(".from.disk.normal", "[0, 0, 0], expected a direction");
-            None
-        }
-        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal).tamed()), *radius)),
-        Source::Sphere { center, radius, surface } => Some(Sampler::Ball(vector(center), *radius, *surface)),
-        Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
-        Source::MeshSurface(file) => sampled(".from.mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),
-        Source::MeshVolume(file) => {
-            let nothing = "the mesh has no inside; close it, turn its triangles outward, or use mesh_surface";
-            let closed = |mesh: &Mesh| Sampler::volume(mesh);
-            if let Some(Fault { defects, place, cure }) = mesh(file).and_then(Mesh::fault) {
-                let n = defects.open_edges + defects.bad_edges;
-                let message =
-                    format!("the mesh has no inside: {n} edges are open or inconsistent, for example {place}; {cure}, or use mesh_surface");
-                wrong(".from.mesh_volume", &message);
-                None
-            } else {
-                sampled(".from.mesh_volume", file, closed, nothing)
-            }
-        }
-        Source::Particles { .. } => None,
-    };
+    let place = sampler(&words.from, mesh, &mut |key, message| wrong(&format!(".from{key}"), message));
     let mut kill = Vec::new();
     for (i, rule) in words.kill.iter().enumerate() {
         let mut region = |shape: &Solid| -> Option<crate::geometry::Collider> {

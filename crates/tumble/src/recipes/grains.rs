@@ -1,16 +1,16 @@
 //! Grains: where they start, and how large each is.
 
 use super::clump;
-use super::emitter::volume;
+use super::emitter::{sampler, volume};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_degrees;
 use crate::math::{Quat, Random};
-use crate::systems::grains::{Clump, Grain};
+use crate::systems::grains::{Clump, Grain, Pour};
 use std::f64::consts::PI;
 use tumble_interface::Mesh;
 use tumble_interface::check::short;
-use tumble_interface::scene::{FillShape, GrainFill, Grains as Words};
+use tumble_interface::scene::{Emit, FillShape, GrainFill, Grains as Words, MeshFile, Source};
 
 /// Key and message of what is wrong.
 type Wrong = (String, String);
@@ -20,15 +20,21 @@ const RADIUS: u32 = 0;
 const PLACE: u32 = 1;
 const TURN: u32 = 2;
 
-/// Grains, and the clumps that they make, with the place of each grain [m] in the axes of its own.
+/// Grains, those that are poured in later at the end, and the clumps that they make, with the place of each grain [m] in the axes of its own.
 pub struct Made {
     pub grains: Vec<Grain>,
+    pub pour: Option<Pour>,
     pub clumps: Vec<Clump>,
     pub local: Vec<Vector>,
 }
 
 /// The grains of an object, with the meshes that its fills name, or all that is wrong with them.
-pub fn grains(words: &Words, seed: u32, meshes: &[Vec<Mesh>]) -> Result<Made, Vec<Wrong>> {
+pub fn grains<'a>(
+    words: &Words,
+    seed: u32,
+    meshes: &[Vec<Mesh>],
+    mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>,
+) -> Result<Made, Vec<Wrong>> {
     let random = Random::new(seed, &words.name);
     let mut wrong = Vec::new();
     let mut places: Vec<Vector> = words.position.iter().map(|x| Vector::from(*x)).collect();
@@ -42,9 +48,10 @@ pub fn grains(words: &Words, seed: u32, meshes: &[Vec<Mesh>]) -> Result<Made, Ve
     if !words.rotate.is_empty() && union.is_none() {
         wrong.push((".rotate".into(), "given to balls; leave it out, or give them a clump".into()));
     }
-    if given == 0 && words.fill.is_empty() {
-        wrong.push((String::new(), "no grain; give it position, or fill".into()));
+    if given == 0 && words.fill.is_empty() && words.emit.is_none() {
+        wrong.push((String::new(), "no grain; give it position, fill, or emit".into()));
     }
+    let pour = words.emit.as_ref().and_then(|emit| pour(emit, words, seed, mesh, &mut wrong));
     for (k, fill) in words.fill.iter().enumerate() {
         match filled(words, fill, meshes.get(k).map_or(&[], Vec::as_slice), &random, places.len()) {
             Ok(more) => places.extend(more),
@@ -64,14 +71,14 @@ pub fn grains(words: &Words, seed: u32, meshes: &[Vec<Mesh>]) -> Result<Made, Ve
         return Err(wrong);
     }
     let each = |list: &[[f64; 3]], i: usize| Vector::from(list.get(i).or(list.first()).copied().unwrap_or_default());
-    let mut made = Made { grains: Vec::new(), clumps: Vec::new(), local: Vec::new() };
+    let mut made = Made { grains: Vec::new(), pour, clumps: Vec::new(), local: Vec::new() };
+    let radius_of = |i: usize| words.radius * (1.0 + words.radius_spread * (2.0 * random.uniform(i as u64, 0, RADIUS)[0] - 1.0));
+    let mass_of = |radius: f64| 4.0 / 3.0 * PI * radius * radius * radius * words.density;
     for (i, x) in places.iter().enumerate() {
-        let [u, ..] = random.uniform(i as u64, 0, RADIUS);
-        let radius = words.radius * (1.0 + words.radius_spread * (2.0 * u - 1.0));
+        let radius = radius_of(i);
         let [v, w] = [each(&words.velocity, i), each(&words.angular_velocity, i)];
         let Some(union) = &union else {
-            let mass = 4.0 / 3.0 * PI * radius * radius * radius * words.density;
-            made.grains.push(Grain { x: *x, radius, mass, v, w });
+            made.grains.push(Grain { x: *x, radius, mass: mass_of(radius), v, w });
             made.local.push(Vector::default());
             continue;
         };
@@ -89,7 +96,31 @@ pub fn grains(words: &Words, seed: u32, meshes: &[Vec<Mesh>]) -> Result<Made, Ve
         }
         made.clumps.push(clump);
     }
+    if let Some(emit) = &words.emit {
+        let none = Vector::default();
+        for i in places.len()..places.len() + emit.count as usize {
+            let radius = radius_of(i);
+            made.grains.push(Grain { x: none, radius, mass: mass_of(radius), v: emit.velocity.into(), w: none });
+            made.local.push(none);
+        }
+    }
     Ok(made)
+}
+
+/// How grains are poured in.
+fn pour<'a>(emit: &Emit, words: &Words, seed: u32, mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>, wrong: &mut Vec<Wrong>) -> Option<Pour> {
+    let mut tell = |key: &str, message: &str| wrong.push((format!(".emit{key}"), message.into()));
+    if words.clump.is_some() {
+        tell("", "only balls are poured; leave out clump, or give the clumps a fill");
+    }
+    if emit.end.is_some_and(|end| end <= emit.start) {
+        tell(".end", "it is not after start");
+    }
+    if matches!(emit.from, Source::Particles { .. }) {
+        tell(".from.particles", "grains are born of no particles; take a disk or a box");
+    }
+    let place = sampler(&emit.from, mesh, &mut |key, message| tell(&format!(".from{key}"), message))?;
+    Some(Pour::new(emit.clone(), place, Random::new(seed, &words.name)))
 }
 
 /// A rotation, all alike likely, of three numbers that are uniform between 0 and 1 [shoemake1992].

@@ -7,11 +7,11 @@ use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::scene::plausible::odd_density;
 use crate::system::System;
-use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Overlaps, Settings, longest_step};
+use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Overlaps, STEP, Settings, longest_step};
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{GrainFill, Grains, Integrator, Method, NormalLaw, Scene, Shape, System as Plan};
+use tumble_interface::scene::{GrainFill, GrainScheme, Grains, Integrator, MeshFile, Method, NormalLaw, Scene, Shape, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -37,8 +37,28 @@ fn law(plan: &Plan) -> NormalLaw {
     plan.grains.clone().unwrap_or_default().law
 }
 
+fn scheme(plan: &Plan) -> GrainScheme {
+    plan.grains.clone().unwrap_or_default().scheme
+}
+
+/// Words that say nothing of grains that are moved by positions.
+fn refuse_softness(scene: &Scene, issues: &mut Vec<Issue>) {
+    const CURE: &str = "hard grains, moved by positions, have no such thing; leave it out, or set scheme = \"forces\"";
+    for plan in scene.system.iter().filter(|plan| plan.method == Method::Grains && scheme(plan) == GrainScheme::Positions) {
+        if law(plan) != NormalLaw::default() {
+            issues.push(Issue::new(format!("system \"{}\".grains.law", plan.name), CURE));
+        }
+        for thing in scene.grains.iter().filter(|t| is_in(&t.system, plan)) {
+            issues.extend(thing.words_of_forces().map(|key| Issue::new(format!("grains \"{}\".{key}", thing.name), CURE)));
+        }
+    }
+}
+
 /// The longest step that resolves all contacts of a system [s].
 fn step(scene: &Scene, plan: &Plan) -> f64 {
+    if scheme(plan) == GrainScheme::Positions {
+        return STEP;
+    }
     let own = scene.grains.iter().filter(|t| is_in(&t.system, plan));
     let of = |t: &Grains| {
         // The matter of a clump is borne by all of its spheres.
@@ -71,6 +91,7 @@ impl MethodRules for Rules {
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
         scheme_of_its_own(scene, Method::Grains, "grains", |plan| plan.grains.is_some(), issues);
+        refuse_softness(scene, issues);
         if scene.dimension == 2 && !scene.grains.is_empty() {
             issues.push(Issue::new("dimension", "2, but grains move in space; set dimension = 3, and take a slice between two planes"));
         }
@@ -80,7 +101,7 @@ impl MethodRules for Rules {
         let odd = |thing: &Grains| odd_density(format!("grains \"{}\".density", thing.name), thing.density, 0.0);
         let mut warnings: Vec<Warning> = scene.grains.iter().filter_map(odd).collect();
         let interval = scene.interval();
-        for plan in scene.system.iter().filter(|plan| plan.method == Method::Grains) {
+        for plan in scene.system.iter().filter(|plan| plan.method == Method::Grains && scheme(plan) == GrainScheme::Forces) {
             let given = plan.substeps.map(|n| ("substeps", interval / f64::from(n)));
             let Some((key, given)) = given.or(plan.step.map(|step| ("step", step.min(interval)))) else { continue };
             let longest = step(scene, plan);
@@ -128,12 +149,13 @@ impl MethodRules for Rules {
                 _ => Vec::new(),
             };
             let meshes: Vec<Vec<Mesh>> = thing.fill.iter().map(mesh_of).collect();
-            match recipes::grains(thing, scene.seed, &meshes) {
+            let assets = builder.assets;
+            match recipes::grains(thing, scene.seed, &meshes, &|file: &MeshFile| assets.get(&file.path)) {
                 Ok(made) => {
                     let range = all.len()..all.len() + made.grains.len();
                     let first = all.len() as u32;
                     let moved = |c: Clump| Clump { spheres: c.spheres.start + first..c.spheres.end + first, ..c };
-                    objects.push((Object { name: thing.name.clone(), grains: range }, material(thing)));
+                    objects.push((Object { name: thing.name.clone(), grains: range, pour: made.pour }, material(thing)));
                     all.extend(made.grains);
                     local.extend(made.local);
                     clumps.extend(made.clumps.into_iter().map(moved));
@@ -150,6 +172,7 @@ impl MethodRules for Rules {
             step: plan.step,
             longest: step(scene, plan),
             sound: scene.grains.iter().map(|t| (t.young / t.density).sqrt()).fold(0.0, f64::max),
+            scheme: scheme(plan),
             law: law(plan),
             gravity: builder.gravity.clone(),
         };

@@ -35,6 +35,9 @@ pub struct Bed {
     /// Forces [N] and torques [N m] of contacts, by the last pass.
     pub force: Vec<Four>,
     pub torque: Vec<Four>,
+    /// By positions: how far contacts shift each, times its mass [kg m], and how many it has.
+    pub shift: Vec<Four>,
+    pub counts: Vec<u32>,
     /// Velocities and 1/mass, angular velocities and radii, and what both gain until the time of the next forces, in the engine's scalar, grain by
     /// grain; and half of what the last forces gave both.
     pub quick: Vec<Row>,
@@ -161,9 +164,14 @@ impl Bed {
             (fastest, farthest)
         });
         let [fastest, farthest] = [|p: &(f64, f64)| p.0, |p: &(f64, f64)| p.1].map(|of| parts.iter().map(of).fold(0.0, f64::max).sqrt());
-        self.travel += h * fastest.max(walls.fastest(t, h, farthest));
-        if self.travel > self.list.slack {
-            self.rebuild(walls, t + h, None);
+        self.went(walls, t + h, h * fastest.max(walls.fastest(t, h, farthest)), self.list.slack);
+    }
+
+    /// Seeks candidates anew where any grain or surface may have gone farther than `most` since; none went farther than `way` in the last step [m].
+    pub fn went(&mut self, walls: &mut Walls, t: f64, way: f64, most: f64) {
+        self.travel += way;
+        if self.travel > most {
+            self.rebuild(walls, t, None);
         }
     }
 
@@ -246,13 +254,6 @@ impl Bed {
     /// Mass of a row [kg]: of a clump the same part for each of its spheres.
     pub fn mass(&self, row: usize) -> f64 {
         self.clumps.at(row).map_or(1.0 / self.v[row][3], |clump| clump.mass / clump.spheres.len() as f64)
-    }
-
-    /// The row of each grain.
-    pub fn rows(&self) -> Vec<u32> {
-        let mut rows = vec![0; self.grain.len()];
-        self.grain.iter().enumerate().for_each(|(row, grain)| rows[*grain as usize] = row as u32);
-        rows
     }
 
     /// The first row that is not finite.

@@ -39,13 +39,14 @@ pub struct Pair<L = f64> {
     /// Damping over √(k m*).
     damping: L,
     /// Of what slides, and of what rests.
-    friction: [L; 2],
-    resists: [L; 2],
+    pub(super) friction: [L; 2],
+    pub(super) resists: [L; 2],
     cohesion: L,
+    pub(super) restitution: L,
 }
 
 /// Numbers of a pair in lanes.
-pub const NUMBERS: usize = 11;
+pub const NUMBERS: usize = 12;
 
 /// Part of critical damping of what resists rolling and twisting.
 const ROLLING: f64 = 0.3;
@@ -54,7 +55,8 @@ pub const BALL: f64 = 0.4;
 /// Mass that a slip moves over m*: balls turn, too.
 const SLIP: f64 = BALL / (1.0 + BALL);
 
-/// What a contact remembers, of the second grain against the first: slip [m] and turn [rad].
+/// What a contact remembers, of the second grain against the first: slip [m] and turn [rad]; by positions the impulse [N s] and the couple [N m s] that
+/// the second had in the last step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Memory<L = f64> {
     pub slip: Vec3<L>,
@@ -124,6 +126,7 @@ impl Pair {
             friction: [larger(|m| m.friction.sliding), larger(|m| m.friction.resting)],
             resists: [larger(|m| m.resists[0]), larger(|m| m.resists[1])],
             cohesion: larger(|m| m.cohesion),
+            restitution: larger(|m| m.restitution),
         }
     }
 
@@ -145,8 +148,9 @@ impl Pair {
 
     /// Its numbers, for [`from_numbers`](Pair::from_numbers).
     pub fn numbers(&self) -> [f64; NUMBERS] {
-        let Self { elastic, compliance: [a, b], shear: [c, d], damping, friction: [e, f], resists: [g, h], cohesion, .. } = *self;
-        [elastic, a, b, c, d, damping, e, f, g, h, cohesion]
+        let Self { elastic, compliance: [a, b], shear: [c, d], damping, friction: [e, f], resists: [g, h], cohesion, restitution, .. } =
+            *self;
+        [elastic, a, b, c, d, damping, e, f, g, h, cohesion, restitution]
     }
 
     /// What a contact stores [J]; radii [m] are infinite of what is flat.
@@ -173,6 +177,7 @@ impl<L: Lane> Pair<L> {
             friction: [n[6], n[7]],
             resists: [n[8], n[9]],
             cohesion: n[10],
+            restitution: n[11],
         }
     }
 

@@ -12,8 +12,9 @@ use crate::math::{Real, Row};
 /// Rows of [`Bed`]: x, y, z and a number.
 pub type Four = [f64; 4];
 
-/// Distance beyond touch at which grains are candidates, over the least radius.
-const SKIN: f64 = 0.4;
+/// Distance beyond touch at which grains are candidates, over the least radius: of grains under forces, and of those that go farther in a step.
+pub const SKIN: f64 = 0.4;
+pub const WIDE_SKIN: f64 = 1.0;
 
 /// Grains that may touch, pair by pair.
 #[derive(Debug, Default, Clone)]
@@ -25,6 +26,8 @@ pub struct Pairs {
     pub slips: Vec<Row>,
     /// Empty where contacts resist no turns.
     pub turns: Vec<Row>,
+    /// By positions: those that touch within the step.
+    pub hits: Vec<u32>,
 }
 
 /// What a contact remembers: slip, with whether it slides, and turn.
@@ -94,12 +97,12 @@ impl Part {
 }
 
 impl List {
-    /// For so many grains with radii between these [m].
-    pub fn new(count: usize, [least, largest]: [f64; 2]) -> Self {
+    /// For so many grains with radii between these [m], and this skin over the least.
+    pub fn new(count: usize, [least, largest]: [f64; 2], skin: f64) -> Self {
         /// Chunks, and rows of the smallest: the fewer, the fewer pairs lie across two.
         const CHUNKS: usize = 8;
         const LEAST: usize = 2048;
-        let skin = SKIN * least;
+        let skin = skin * least;
         Self {
             skin,
             grid: Neighbours::new(2.0 * largest + skin),

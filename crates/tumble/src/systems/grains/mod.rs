@@ -7,14 +7,19 @@
 
 mod bed;
 mod clumps;
+mod hard;
 mod kick;
 mod law;
 mod list;
+mod positions;
+mod pour;
 mod press;
 mod walls;
 
 pub use clumps::{Clump, Clumps};
 pub use law::{Material, longest_step};
+pub use positions::STEP;
+pub use pour::Pour;
 
 use crate::exchange::Turn;
 use crate::forces::Gravity;
@@ -25,12 +30,12 @@ use crate::system::{Archive, Part, System};
 use bed::{Bed, Body};
 use kick::Kick;
 use law::{Dampings, Memory, Pair};
-use list::{Kept, List, point};
+use list::{Kept, List, SKIN, WIDE_SKIN, point};
 use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::engine::{BLOW_UP, Ledger, Share, Stability, StepReport, Worst};
 use tumble_interface::error::Breakdown;
-use tumble_interface::scene::NormalLaw;
+use tumble_interface::scene::{GrainScheme, NormalLaw};
 use tumble_interface::{Column, StepError};
 use walls::{WallContact, Walls};
 
@@ -64,8 +69,23 @@ pub struct Grain {
 pub struct Object {
     /// Its name.
     pub name: String,
-    /// Its grains.
+    /// Its grains, those that are still to be born at the end.
     pub grains: Range<usize>,
+    /// How these are.
+    pub pour: Option<Pour>,
+}
+
+impl Object {
+    /// Those that have been born.
+    fn living(&self) -> Range<usize> {
+        self.living_with(self.pour.as_ref().map_or(0, |pour| pour.born))
+    }
+
+    /// The same if so many had been poured, as far as there are so many.
+    fn living_with(&self, born: u32) -> Range<usize> {
+        let unborn = self.pour.as_ref().map_or(0, |pour| pour.count().saturating_sub(born) as usize);
+        self.grains.start..self.grains.end - unborn
+    }
 }
 
 /// How the system goes on.
@@ -80,6 +100,8 @@ pub struct Settings {
     pub longest: f64,
     /// The largest speed of sound of a material [m/s].
     pub sound: f64,
+    /// How contacts act.
+    pub scheme: GrainScheme,
     /// The force of a contact.
     pub law: NormalLaw,
     /// Gravity.
@@ -90,6 +112,8 @@ pub struct Settings {
 pub struct Grains {
     settings: Settings,
     objects: Vec<Object>,
+    /// Radius [m], 1/mass [1/kg] and kind of each grain, born or not.
+    known: Vec<[f64; 3]>,
     bed: Bed,
     walls: Walls,
     /// The last sub-step [s].
@@ -122,22 +146,28 @@ impl Grains {
         }
         let radii =
             grains.iter().fold([f64::INFINITY, 0.0_f64], |[least, largest], grain| [least.min(grain.radius), largest.max(grain.radius)]);
+        let skin = match settings.scheme {
+            GrainScheme::Forces => SKIN,
+            GrainScheme::Positions => WIDE_SKIN,
+        };
         let row = |v: Vector, number: f64| [v.x, v.y, v.z, number];
         let kind = |i: usize| objects.iter().position(|object| object.grains.contains(&i)).unwrap_or_default() as f64;
+        let known: Vec<[f64; 3]> = grains.iter().enumerate().map(|(i, grain)| [grain.radius, 1.0 / grain.mass, kind(i)]).collect();
+        let born: Vec<usize> = objects.iter().flat_map(Object::living).collect();
         let mut bed = Bed {
-            x: grains.iter().map(|grain| row(grain.x, grain.radius)).collect(),
-            v: grains.iter().map(|grain| row(grain.v, 1.0 / grain.mass)).collect(),
-            w: grains.iter().enumerate().map(|(i, grain)| row(grain.w, kind(i))).collect(),
-            grain: (0..grains.len() as u32).collect(),
+            x: born.iter().map(|i| row(grains[*i].x, known[*i][0])).collect(),
+            v: born.iter().map(|i| row(grains[*i].v, known[*i][1])).collect(),
+            w: born.iter().map(|i| row(grains[*i].w, known[*i][2])).collect(),
+            grain: born.iter().map(|i| *i as u32).collect(),
             pairs,
             kinds: kinds.len(),
-            list: List::new(grains.len(), radii),
+            list: List::new(grains.len(), radii, skin),
             clumps,
             ..Bed::default()
         };
         bed.clumps.sort(&bed.grain);
         let walls = Walls::new(settings.law, kinds);
-        Self { settings, objects, bed, walls, h: 0.0, scale: 0.0, tolerant: false }
+        Self { settings, objects, known, bed, walls, h: 0.0, scale: 0.0, tolerant: false }
     }
 
     /// Takes over solids that others have published.
@@ -171,6 +201,29 @@ impl Grains {
         self.settings.substeps.unwrap_or_else(|| equal_steps(dt, self.settings.step.unwrap_or(self.settings.longest)) as u32)
     }
 
+    fn pours(&self) -> impl Iterator<Item = &Pour> {
+        self.objects.iter().filter_map(|object| object.pour.as_ref())
+    }
+
+    /// Grains that wait for room at a time [s], if any are poured.
+    fn waiting(&self, t: f64) -> Option<u64> {
+        self.pours().map(|pour| u64::from(pour.due(t).saturating_sub(pour.born))).reduce(|a, b| a + b)
+    }
+
+    /// The row of each grain; of one that is not born none.
+    fn rows(&self) -> Vec<u32> {
+        let mut rows = vec![u32::MAX; self.known.len()];
+        self.bed.grain.iter().enumerate().for_each(|(row, grain)| rows[*grain as usize] = row as u32);
+        rows
+    }
+
+    /// What does not change of an object's grains.
+    fn constants(&self, object: &Object, rows: &[u32], out: &mut Vec<Column>) {
+        let of = |number: &dyn Fn(usize) -> f64| rows[object.living()].iter().map(|row| number(*row as usize) as Real).collect::<Vec<_>>();
+        out.push(Column::new(&object.name, "radius", of(&|row| self.bed.x[row][3])));
+        out.push(Column::new(&object.name, "mass", of(&|row| self.bed.mass(row))));
+    }
+
     /// Object of a row, and the index of its grain there.
     fn owner(&self, row: usize) -> Option<(&Object, usize)> {
         let grain = *self.bed.grain.get(row)? as usize;
@@ -201,6 +254,41 @@ impl Grains {
         self.walls.kick(kick);
     }
 
+    /// Takes n steps of h from the time t on [s]; `false` if `go_on` ends it.
+    fn go_by_forces(&mut self, (t, h, n): (f64, f64, u32), go_on: &(dyn Fn() -> bool + Sync), report: &mut StepReport) -> bool {
+        self.bed.press(&mut self.walls, t, 0.0);
+        self.kick(t, Kick { h: 0.5 * h, step: h, first: true });
+        for k in 1..=n {
+            if !go_on() {
+                return false;
+            }
+            let time = t + f64::from(k) * h;
+            self.walls.drift(h);
+            self.bed.drift(&mut self.walls, time - h, h);
+            self.bed.press(&mut self.walls, time, h);
+            self.kick(time, Kick { h: if k < n { h } else { 0.5 * h }, step: h, first: false });
+            report.stepped(h);
+        }
+        self.bed.settle();
+        true
+    }
+
+    /// The same by positions.
+    fn go_by_positions(&mut self, (t, h, n): (f64, f64, u32), go_on: &(dyn Fn() -> bool + Sync), report: &mut StepReport) -> bool {
+        self.bed.recall(&self.walls);
+        for k in 0..n {
+            if !go_on() {
+                return false;
+            }
+            let time = t + f64::from(k) * h;
+            let gravity = self.settings.gravity.at(time).into();
+            self.bed.step(&mut self.walls, time, h, gravity);
+            report.stepped(h);
+            report.sweeps += u64::from(positions::PASSES);
+        }
+        true
+    }
+
     /// The state of rows of some grains.
     fn ledger_of(&self, rows: &[u32], t: f64) -> Ledger {
         let gravity = Vector::from(self.settings.gravity.at(t));
@@ -224,7 +312,7 @@ impl System for Grains {
     }
 
     fn version(&self) -> u32 {
-        2
+        3
     }
 
     /// Grains are no bodies that others push: they visit.
@@ -238,21 +326,15 @@ impl System for Grains {
         let h = dt / f64::from(n);
         self.h = h;
         self.bed.sort(&mut self.walls, t);
-        self.bed.press(&mut self.walls, t, 0.0);
-        self.kick(t, Kick { h: 0.5 * h, step: h, first: true });
-        for k in 1..=n {
-            if !go_on() {
-                return Ok(report);
-            }
-            let time = t + f64::from(k) * h;
-            self.walls.drift(h);
-            self.bed.drift(&mut self.walls, time - h, h);
-            self.bed.press(&mut self.walls, time, h);
-            self.kick(time, Kick { h: if k < n { h } else { 0.5 * h }, step: h, first: false });
-            report.stepped(h);
+        let whole = match self.settings.scheme {
+            GrainScheme::Forces => self.go_by_forces((t, h, n), go_on, &mut report),
+            GrainScheme::Positions => self.go_by_positions((t, h, n), go_on, &mut report),
+        };
+        if !whole {
+            return Ok(report);
         }
-        self.bed.settle();
         self.walls.post(exchange);
+        self.pour(t + dt, dt);
         Ok(report)
     }
 
@@ -263,8 +345,8 @@ impl System for Grains {
     }
 
     fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
-        let rows = self.bed.rows();
-        for Object { name, grains } in &self.objects {
+        let rows = self.rows();
+        for object in &self.objects {
             for column in names {
                 let of = match *column {
                     "position" => &self.bed.x,
@@ -272,45 +354,48 @@ impl System for Grains {
                     "angular_velocity" => &self.bed.w,
                     _ => continue,
                 };
-                let numbers = rows[grains.clone()].iter().flat_map(|row| of[*row as usize][..3].iter().map(|c| *c as Real));
-                out.push(Column::new(name, column, numbers.collect::<Vec<_>>()));
+                let numbers = rows[object.living()].iter().flat_map(|row| of[*row as usize][..3].iter().map(|c| *c as Real));
+                out.push(Column::new(&object.name, column, numbers.collect::<Vec<_>>()));
+            }
+            if object.pour.is_some() {
+                self.constants(object, &rows, out);
             }
         }
     }
 
+    /// Of objects whose grains are all there from the start.
     fn topology(&self, out: &mut Vec<Column>) {
-        let rows = self.bed.rows();
-        for Object { name, grains } in &self.objects {
-            let of =
-                |number: &dyn Fn(usize) -> f64| rows[grains.clone()].iter().map(|row| number(*row as usize) as Real).collect::<Vec<_>>();
-            out.push(Column::new(name, "radius", of(&|row| self.bed.x[row][3])));
-            out.push(Column::new(name, "mass", of(&|row| self.bed.mass(row))));
-        }
+        let rows = self.rows();
+        self.objects.iter().filter(|object| object.pour.is_none()).for_each(|object| self.constants(object, &rows, out));
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        let all: Vec<u32> = self.bed.rows();
+        let all: Vec<u32> = self.rows().into_iter().filter(|row| *row != u32::MAX).collect();
         let (energy, deepest, count) = self.bed.stored();
         let of = |contact: &WallContact| {
             let row = contact.row as usize;
             self.walls.energy(contact, self.bed.x[row][3], self.bed.w[row][3], t)
         };
-        let walls: f64 = self.walls.contacts().map(of).sum();
+        let elastic = match self.settings.scheme {
+            GrainScheme::Forces => energy + self.walls.contacts().map(of).sum::<f64>(),
+            GrainScheme::Positions => 0.0,
+        };
         let depth = self.walls.contacts().map(|contact| contact.depth).fold(deepest.map_or(0.0, |(depth, _)| depth), f64::max);
         Ledger {
-            elastic: energy + walls,
+            elastic,
             penetration: Some(depth),
             contacts: Some(count + self.walls.contacts().count() as u64),
+            waiting: self.waiting(t),
             ..self.ledger_of(&all, t)
         }
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let rows = self.bed.rows();
+        let rows = self.rows();
         let share = |object: &Object| Share {
             system: self.settings.name.clone(),
             object: object.name.clone(),
-            ledger: self.ledger_of(&rows[object.grains.clone()], t),
+            ledger: self.ledger_of(&rows[object.living()], t),
         };
         self.objects.iter().map(share).collect()
     }
@@ -363,6 +448,8 @@ impl System for Grains {
     fn save(&self, archive: &mut Archive) {
         let Bed { x, v, w, grain, list, .. } = &self.bed;
         archive.push_indices("grains", grain);
+        let poured: Vec<u32> = self.pours().flat_map(|pour| [pour.born, pour.sought]).collect();
+        archive.push_indices("poured", &poured);
         let rows = x.iter().zip(v).zip(w).flat_map(|((x, v), w)| [&x[..3], &v[..3], &w[..3]].concat());
         archive.push("rows", Part::Numbers(rows.collect()));
         let three = <[f64; 3]>::from;
@@ -384,13 +471,16 @@ impl System for Grains {
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
-        let (grain, rows) = (archive.indices("grains")?, archive.numbers("rows")?);
+        let (grain, poured, rows) = (archive.indices("grains")?, archive.indices("poured")?, archive.numbers("rows")?);
         let (pairs, memories) = (archive.indices("pairs")?, archive.table_of(CONTACT, "contacts")?);
         let (keys, kept, clumps) = (archive.indices("keys")?, archive.numbers("walls")?, archive.numbers("clumps")?);
-        let count = self.bed.x.len();
         let mut sorted = grain.clone();
         sorted.sort_unstable();
-        let whole = sorted.iter().enumerate().all(|(i, grain)| i == *grain as usize) && sorted.len() == count;
+        let count = sorted.len();
+        let mut born = poured.iter().step_by(2).copied();
+        let mut living = |object: &Object| object.living_with(object.pour.as_ref().and_then(|_| born.next()).unwrap_or(0));
+        let living: Vec<usize> = self.objects.iter().flat_map(&mut living).collect();
+        let whole = poured.len() == 2 * self.pours().count() && living.iter().copied().eq(sorted.iter().map(|grain| *grain as usize));
         let ordered =
             |keys: &[u32]| keys.chunks_exact(2).all(|key| (key[0] as usize) < count) && keys.chunks_exact(2).is_sorted_by_key(|key| key[0]);
         let fits = rows.len() == ROW * count && memories.len() * 2 == CONTACT * pairs.len() && kept.len() * 2 == WALL * keys.len();
@@ -398,21 +488,16 @@ impl System for Grains {
             return None;
         }
         self.bed.clumps.restore(&clumps)?;
-        // What does not change goes along with its grain.
-        let bed = &mut self.bed;
-        let place = bed.rows();
-        let constant: Vec<[f64; 3]> = grain
-            .iter()
-            .map(|grain| {
-                let row = place[*grain as usize] as usize;
-                [bed.x[row][3], bed.v[row][3], bed.w[row][3]]
-            })
-            .collect();
-        for (row, (s, constant)) in rows.chunks_exact(ROW).zip(constant).enumerate() {
-            bed.x[row] = [s[0], s[1], s[2], constant[0]];
-            bed.v[row] = [s[3], s[4], s[5], constant[1]];
-            bed.w[row] = [s[6], s[7], s[8], constant[2]];
+        for (pour, s) in self.objects.iter_mut().filter_map(|object| object.pour.as_mut()).zip(poured.chunks_exact(2)) {
+            (pour.born, pour.sought) = (s[0].min(pour.count()), s[1]);
         }
+        // What does not change goes along with its grain.
+        let (bed, known) = (&mut self.bed, &self.known);
+        let row = |s: &[f64], number: f64| [s[0], s[1], s[2], number];
+        let states = || rows.chunks_exact(ROW).zip(grain.iter().map(|grain| known[*grain as usize]));
+        bed.x = states().map(|(s, [radius, ..])| row(s, radius)).collect();
+        bed.v = states().map(|(s, [_, inverse, _])| row(&s[3..], inverse)).collect();
+        bed.w = states().map(|(s, [.., kind])| row(&s[6..], kind)).collect();
         bed.grain = grain;
         let three = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
         let contacts = pairs.chunks_exact(2).zip(memories.chunks_exact(CONTACT));
@@ -431,8 +516,8 @@ impl System for Grains {
     }
 
     fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
-        let grains = self.objects.iter().find(|o| o.name == object)?.grains.clone();
-        let rows = self.bed.rows();
+        let grains = self.objects.iter().find(|o| o.name == object)?.living();
+        let rows = self.rows();
         let into = match column {
             "position" => &mut self.bed.x,
             "velocity" => &mut self.bed.v,

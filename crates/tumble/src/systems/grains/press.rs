@@ -20,9 +20,9 @@ pub struct Rows<'a> {
 }
 
 /// Contacts at most in a register.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 /// Their numbers.
-const ALL: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+pub(super) const ALL: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 /// Candidates that are looked through before those that touch are computed.
 const BLOCK: usize = 256;
 
@@ -229,29 +229,29 @@ impl Pass<'_> {
 
 /// The first three of four.
 #[inline(always)]
-fn three<L: Lane>(rows: [L; 4]) -> Vec3<L> {
+pub(super) fn three<L: Lane>(rows: [L; 4]) -> Vec3<L> {
     Vec3 { x: rows[0], y: rows[1], z: rows[2] }
 }
 
 /// Vectors and a number as rows of a batch.
 #[inline(always)]
-fn put<W: Width>(w: W, v: Vec3<W::L>, last: W::L, rows: &mut [Row; LANES]) {
+pub(super) fn put<W: Width>(w: W, v: Vec3<W::L>, last: W::L, rows: &mut [Row; LANES]) {
     // SAFETY: there is a row for every lane.
     unsafe { w.put([v.x, v.y, v.z, last], rows.as_mut_ptr(), &ALL) };
 }
 
 /// A row in double precision.
 #[inline(always)]
-fn wide(row: &Row) -> Four {
+pub(super) fn wide(row: &Row) -> Four {
     [f64::from(row[0]), f64::from(row[1]), f64::from(row[2]), f64::from(row[3])]
 }
 
 #[inline(always)]
-fn sum(a: &Four, b: &Four) -> Four {
+pub(super) fn sum(a: &Four, b: &Four) -> Four {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
 #[inline(always)]
-fn difference(a: &Four, b: &Four) -> Four {
+pub(super) fn difference(a: &Four, b: &Four) -> Four {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]]
 }

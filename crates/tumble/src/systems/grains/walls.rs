@@ -1,9 +1,13 @@
 //! Contact of grains with solids, and with rigid bodies, which yield.
 
+mod by_positions;
+
+pub use by_positions::HardTouched;
+
 use super::kick::{Kick, QUICK};
 use super::law::{Dampings, Material, Memory, Overlap, Pair};
 use super::list::{Four, point};
-use crate::exchange::{Exchange, Turn, Visit};
+use crate::exchange::{BodyState, Exchange, Turn, Visit};
 use crate::geometry::{Collider, Friction, Search, Shape, Vector};
 use crate::math::Row;
 use crate::math::parallel::Tasks;
@@ -44,6 +48,9 @@ struct Body {
     /// What velocity and spin gain until the time of the next forces, and half of what the last forces gave both.
     gains: [Vector; 2],
     last: [Vector; 2],
+    /// By positions: its state with the impulses of the last pass, and how many grains touch it.
+    ahead: BodyState,
+    touches: u32,
 }
 
 /// The walls of a chunk.
@@ -128,8 +135,10 @@ impl Walls {
         self.bodies.clear();
         for (shape, surface) in surfaces.iter().enumerate() {
             let reach = surface.reach + surface.solid.thickness;
-            let body =
-                |at: &_| Body { visit: Visit::new(exchange, *at, reach), shape, gains: Default::default(), last: Default::default() };
+            let body = |at: &_| {
+                let visit = Visit::new(exchange, *at, reach);
+                Body { ahead: visit.state, visit, shape, gains: Default::default(), last: Default::default(), touches: 0 }
+            };
             self.bodies.extend(surface.rows.iter().map(body));
         }
     }
@@ -137,6 +146,11 @@ impl Walls {
     /// How many solids there are.
     pub fn solids(&self) -> usize {
         self.solids.len()
+    }
+
+    /// How many surfaces there are, those of bodies after those of solids.
+    pub fn surfaces(&self) -> usize {
+        self.solids.len() + self.bodies.len()
     }
 
     /// Name of a surface.
@@ -201,7 +215,7 @@ impl Walls {
         let mut kept: Vec<WallContact> = self.contacts().map(|c| WallContact { row: places[c.row as usize], ..*c }).collect();
         // Of several contacts with one surface the order stays.
         kept.sort_by_key(|contact| [contact.row, contact.surface]);
-        let surfaces = self.solids.len() + self.bodies.len();
+        let surfaces = self.surfaces();
         let walls = &*self;
         let chunk = |start: usize| {
             let rows = start..(start + rows_each).min(x.len());
