@@ -43,6 +43,7 @@ BEGINNINGS = {
     "gas/vortex_street": 4,
     "grains/hopper": 16,
     "grains/hourglass": 24,
+    "grains/pour": 12,
     "gravity/encounter": 48,
     "gravity/galaxy": 24,
     "heat/finned_plate": 30,
@@ -51,6 +52,7 @@ BEGINNINGS = {
     "particles/snow": 48,
     "particles/tornado": 48,
     "particles/waterfall": 36,
+    "rigid/shatter": 24,
     "structures/blocks": 24,
     "structures/others": 14,
 }
