@@ -1,7 +1,8 @@
 """Pyramids of 1,015 and 4,900 cubes that stand: time of 1/60 s, against Rapier driven directly.
 
 No cube sleeps. tumble takes its own sub-steps and passes, and in a second case as many as the defaults of Rapier: four
-sub-steps, of two passes. The check is how far any cube has moved after two seconds: a pyramid that sinks or creeps is no pile."""
+sub-steps, of two passes. The check is how far any cube has moved after two seconds: a pyramid that sinks or creeps is no
+pile."""
 
 import shutil
 import subprocess

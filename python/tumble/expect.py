@@ -354,8 +354,11 @@ def probes(world: World, scene: Mapping[str, Any]) -> list[list[float]]:
         elif "id" in table[name]:
             rows = table[name][column][table[name]["id"] == index]
             found.append([float(x) for x in np.atleast_1d(rows[0])] if len(rows) else [np.nan])
+        elif index >= (most := max(len(table[name][column]), len(topology.get(name, {}).get("mass", ())))):
+            issues.append(f'{path}.index: {index}, expected < {most}, the length of "{name}"')
         elif index >= len(table[name][column]):
-            issues.append(f'{path}.index: {index}, expected < {len(table[name][column])}, the length of "{name}"')
+            # A body that is still to be born.
+            found.append([np.nan])
         else:
             found.append([float(x) for x in np.atleast_1d(table[name][column][index])])
     if issues:

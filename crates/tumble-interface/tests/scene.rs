@@ -170,6 +170,7 @@ fn the_schema_gives_every_number_a_unit() {
         "kind",
         "Shape.oneOf",
         "Arrange.oneOf",
+        "BirthRegion.oneOf",
         "Source.oneOf",
         "Kill.oneOf",
         "GasSide.oneOf",

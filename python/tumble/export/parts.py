@@ -346,9 +346,9 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
     if part.thing.vertices is not None:
         yield from _bodies(part.thing, part.thing.vertices, columns)
         if part.grows:
-            n = len(positions(columns, part.thing))
-            yield "protoIndices", "int[]", np.zeros(n, dtype=np.int32)
-            yield "ids", "int64[]", np.arange(n, dtype=np.int64)
+            count = len(positions(columns, part.thing))
+            yield "protoIndices", "int[]", np.zeros(count, dtype=np.int32)
+            yield "ids", "int64[]", np.arange(count, dtype=np.int64)
         return
     if part.trail:
         points, counts = now.ways[part.thing.name]

@@ -692,7 +692,7 @@ impl System for Rigid {
         for (own, s) in self.births.iter_mut().zip(births.chunks_exact(2)) {
             *own = Births { born: s[0] as usize, tried: s[1] };
         }
-        self.fill(&broken);
+        self.fill(broken);
         for (joint, s) in self.joints.all.iter_mut().zip(joints.chunks_exact(JOINT)) {
             (joint.broken, joint.load) = (s[0] == 1.0, [three(&s[1..]), three(&s[4..])]);
         }
