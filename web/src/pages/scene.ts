@@ -317,16 +317,20 @@ export const page: Page = async (main, rest) => {
 
   // Values.
   let panel: Panel | null = null;
-  /** Scenes whose stable steps take longer to find would wait for them. */
-  const QUICK = 250;
-  let tooLong = "";
+  /** What was last not found, and in how long [ms]. */
+  let missed = { toml: "", budget: 0 };
+  /** Finding stable steps keeps the engine from its frames: for a moment while they play, for longer while nobody waits. */
   const tellLimits = async () => {
-    if (tooLong === session.toml || !panel) return;
     const { toml } = session;
-    const start = performance.now();
-    const list = await session.stability(QUICK).catch(() => []);
-    if (!list.length && performance.now() - start > QUICK) tooLong = toml;
-    panel?.limits(list);
+    for (const budget of session.playing ? [250] : [250, 4000]) {
+      if (!panel || (missed.toml === toml && missed.budget >= budget)) continue;
+      const start = performance.now();
+      const list = await session.stability(budget).catch(() => []);
+      if (session.toml !== toml) return;
+      panel.limits(list);
+      if (list.length || performance.now() - start < budget) return;
+      missed = { toml, budget };
+    }
   };
   const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
