@@ -492,6 +492,10 @@ fn what_is_wrong_with_grains_is_told_at_once_with_a_cure() {
     });
     let told = wrong(&(grains("pressed", "radius = 0.01\nposition = [[0, 0, 0]]") + &walls.concat()));
     assert!(told.len() == 1 && told[0].contains("room"), "{told:?}");
+    // So many in one place that all meet all.
+    let heap = vec!["[0, 0, 0]"; 300].join(", ");
+    let told = wrong(&grains("heap", &format!("radius = 0.01\nposition = [{heap}]")));
+    assert!(told.len() == 1 && told[0].contains("more than 100 others"), "{told:?}");
     // Words of others.
     let told = wrong(&format!(
         "dimension = 2\n[[system]]\nmethod = \"grains\"\nclamp = 2\nsolver.newton_iterations = 3\n{}",

@@ -192,8 +192,14 @@ impl MethodRules for Rules {
 
 /// Tells that grains overlap at the start.
 fn tell(builder: &mut Builder<'_>, plan: &Plan, overlaps: &Overlaps) {
-    let Overlaps { count, deepest, left, most } = overlaps;
     let path = format!("system \"{}\"", plan.name);
+    let (count, deepest, left, most) = match overlaps {
+        Overlaps::Crushed(most) => {
+            let what = format!("each grain meets more than {most} others on average at the start");
+            return builder.issues.push(Issue::new(path, format!("{what}; take fewer grains, or move solids that leave them no room")));
+        }
+        Overlaps::Parted { count, deepest, left, most } => (count, deepest, left, most),
+    };
     let what = format!("{count} contacts, of grains with each other or with solids, overlap at the start by up to {} m", short(*deepest));
     if left > most {
         builder.issues.push(Issue::new(path, format!("{what}, and cannot be moved apart; take fewer grains, or give them more room")));

@@ -74,6 +74,12 @@ impl Bed {
         self.rebuild(walls, t, Some(&order));
     }
 
+    /// Whether grains have more candidates than so many on average, clumps that for each of their spheres.
+    pub fn is_crushed(&mut self, most: usize) -> bool {
+        let spheres = self.clumps.all.iter().map(|clump| clump.spheres.len()).max().unwrap_or(1);
+        self.list.exceeds(&self.x, most * spheres * self.x.len())
+    }
+
     /// Seeks candidates anew; rows may have come from others.
     fn rebuild(&mut self, walls: &mut Walls, t: f64, from: Option<&[u32]>) {
         let same: Vec<u32> = (0..self.x.len() as u32).collect();

@@ -8,6 +8,7 @@ use super::law::Memory;
 use crate::geometry::{Neighbours, Vector};
 use crate::math::parallel::Tasks;
 use crate::math::{Real, Row};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rows of [`Bed`]: x, y, z and a number.
 pub type Four = [f64; 4];
@@ -122,6 +123,25 @@ impl List {
     fn place(&mut self, x: &[Four]) {
         let rows: Vec<Row> = x.iter().map(|x| [x[0] as Real, x[1] as Real, x[2] as Real, 0.0]).collect();
         self.grid.rebuild(&rows);
+    }
+
+    /// Whether there would be more candidates than so many.
+    pub fn exceeds(&mut self, x: &[Four], most: usize) -> bool {
+        self.place(x);
+        let (order, skin, count) = (self.grid.order(), self.skin, AtomicUsize::new(0));
+        self.grid.each(&mut vec![(); self.grid.len()], |place, runs, ()| {
+            if count.load(Ordering::Relaxed) > most {
+                return;
+            }
+            let here = &x[order[place] as usize];
+            let near = |other: &&u32| {
+                let there = &x[**other as usize];
+                (point(there) - point(here)).norm_sq() < (here[3] + there[3] + skin).powi(2)
+            };
+            let found = runs.iter().flat_map(|[first, end]| &order[*first as usize..*end as usize]).filter(near).count();
+            count.fetch_add(found, Ordering::Relaxed);
+        });
+        count.into_inner() > most
     }
 
     /// Seeks candidates anew; `before` are the rows that grains had in the last list. Without `turns` contacts remember slips alone. Those

@@ -46,6 +46,8 @@ const WALL: usize = 11;
 /// Overlap at the start, over the least radius, that is taken apart, and what is left of it.
 const OVERLAP: f64 = 0.1;
 const LEFT: f64 = 0.01;
+/// Candidates of a grain, on average: those that do not overlap have some ten each, of any sizes.
+const CROWD: usize = 100;
 /// Passes that take overlaps apart, with the candidates of a sort, and sorts.
 const PASSES: usize = 20;
 const SORTS: usize = 50;
@@ -124,15 +126,20 @@ pub struct Grains {
 }
 
 /// Overlaps at the start.
-pub struct Overlaps {
-    /// How many there are.
-    pub count: usize,
-    /// The deepest [m].
-    pub deepest: f64,
-    /// What is left of it [m].
-    pub left: f64,
-    /// What may be left [m].
-    pub most: f64,
+pub enum Overlaps {
+    /// More grains meet than could be moved apart, so many on average [1].
+    Crushed(usize),
+    /// They have been moved apart as far as they could.
+    Parted {
+        /// How many there were.
+        count: usize,
+        /// The deepest [m].
+        deepest: f64,
+        /// What is left of it [m].
+        left: f64,
+        /// What may be left [m].
+        most: f64,
+    },
 }
 
 impl Grains {
@@ -178,6 +185,9 @@ impl Grains {
     /// Moves grains that overlap, each other or solids, apart, if any do by more than they may.
     pub fn part(&mut self) -> Option<Overlaps> {
         let least = self.bed.x.iter().map(|x| x[3]).fold(f64::INFINITY, f64::min);
+        if self.bed.is_crushed(CROWD) {
+            return Some(Overlaps::Crushed(CROWD));
+        }
         self.bed.sort(&mut self.walls, 0.0);
         let given = self.bed.x.clone();
         let (count, deepest) = self.bed.part(&self.walls);
@@ -187,6 +197,10 @@ impl Grains {
         }
         let mut left = deepest;
         for _ in 0..SORTS {
+            // Solids may leave no room.
+            if self.bed.is_crushed(CROWD) {
+                return Some(Overlaps::Crushed(CROWD));
+            }
             self.bed.sort(&mut self.walls, 0.0);
             left = self.bed.part(&self.walls).1;
             if left <= LEFT * least {
@@ -194,7 +208,7 @@ impl Grains {
             }
             (1..PASSES).for_each(|_| _ = self.bed.part(&self.walls));
         }
-        Some(Overlaps { count, deepest, left, most: OVERLAP * least })
+        Some(Overlaps::Parted { count, deepest, left, most: OVERLAP * least })
     }
 
     fn steps(&self, dt: f64) -> u32 {

@@ -1,13 +1,14 @@
 //! Contacts between bodies: pairs by sorted bounds, points by Parry.
 
 use super::body::Body;
+use super::overlap;
 use crate::geometry::{Friction, Vector};
 use crate::math::Quat;
 use crate::math::parallel::{Tasks, fold};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rotation, Vector as V};
 use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, intersection_test};
-use parry3d_f64::shape::SharedShape;
+use parry3d_f64::shape::{Shape, SharedShape};
 
 /// Surfaces this close count as touching, over the reach of a body.
 const CLOSE: f64 = 1e-3;
@@ -285,6 +286,11 @@ fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
     found
 }
 
+/// A part of a shape, itself if it has none.
+fn part(shape: &SharedShape, k: u32) -> &dyn Shape {
+    shape.as_compound().map_or(&*shape.0, |whole| &*whole.shapes()[k as usize].1.0)
+}
+
 /// Points of a pair that are closer than `within` [m].
 fn look(bodies: &Bodies, pair: [u32; 2], within: f64) -> Seen {
     let [i, j] = pair.map(|i| i as usize);
@@ -295,7 +301,10 @@ fn look(bodies: &Bodies, pair: [u32; 2], within: f64) -> Seen {
     // Shapes that it cannot pair are refused when a scene is read.
     let _ = DefaultQueryDispatcher.contact_manifolds(&apart, &*one.shape.0, &*two.shape.0, within + skin, &mut manifolds, &mut None);
     let mut points = Vec::new();
-    for manifold in &manifolds {
+    for manifold in &mut manifolds {
+        let places = [manifold.subshape_pos1(), manifold.subshape_pos2()].map(|place| place.copied().unwrap_or_default());
+        let parts = [part(&one.shape, manifold.subshape1), part(&two.shape, manifold.subshape2)];
+        overlap::correct(manifold, within + skin, &places[0].inv_mul(&(apart * places[1])), parts);
         let part = manifold.subshape_pos1().map_or(first, |own| first * *own);
         let normal = vector(part.rotation * manifold.local_n1);
         let owner = if b.inverse_mass == 0.0 { b } else { a };

@@ -15,6 +15,7 @@ mod fracture;
 mod glue;
 mod joint;
 mod lever;
+mod overlap;
 mod pattern;
 mod solids;
 mod solve;
