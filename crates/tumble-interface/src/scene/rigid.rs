@@ -67,6 +67,9 @@ pub struct Body {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub restitution: f64,
+    /// Sleep of bodies that have come to rest: they stand still, and cost nothing, until something touches or pushes them. What joints hold stays awake.
+    #[serde(default)]
+    pub sleeping: bool,
     /// Birth of the bodies during the run; none is there at the start.
     #[serde(default)]
     pub emit: Option<BodyEmit>,

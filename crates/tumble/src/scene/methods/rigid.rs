@@ -7,7 +7,7 @@ use crate::geometry::{Collider, Motion, Vector};
 use crate::recipes;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
-use crate::scene::laws::Reader;
+use crate::scene::laws::{Reader, flat, off_plane};
 use crate::scene::plausible::odd_density;
 use crate::system::System;
 use crate::systems::rigid::{Bodies, Body as State, Ends, Joint, Object, Rigid, Settings, refusal};
@@ -67,8 +67,8 @@ impl MethodRules for Rules {
             }
         }
         changing(scene, issues);
-        if scene.dimension == 2 && !scene.body.is_empty() {
-            issues.push(Issue::new("dimension", "2, but rigid bodies move in space; set dimension = 3"));
+        if let Some(axis) = flat(scene) {
+            scene.body.iter().for_each(|thing| in_plane(thing, axis, issues));
         }
     }
 
@@ -128,7 +128,14 @@ impl MethodRules for Rules {
         let (mut objects, mut bodies, mut solids) = (Vec::new(), Bodies::default(), Vec::new());
         for thing in scene.body.iter().filter(|t| is_in(&t.system, plan)) {
             match recipes::bodies(thing, &file_of(builder.assets), scene.seed) {
-                Ok(made) => {
+                Ok(mut made) => {
+                    if let Some(axis) = flat(scene) {
+                        if thing.arrange.is_some() && made.bodies.iter().any(|body| <[f64; 3]>::from(body.x)[axis] != 0.0) {
+                            let message = "it leads out of the plane of a scene of dimension 2; give positions, or set dimension = 3";
+                            builder.issues.push(Issue::new(format!("body \"{}\".arrange", thing.name), message));
+                        }
+                        made.bodies.iter_mut().for_each(|body| body.across = Some(axis));
+                    }
                     let (first, each) = (bodies.rows.len(), thing.pieces());
                     let (hull, left) = made.hull();
                     builder.warnings.extend(left.map(|left| coarse(thing, left)));
@@ -143,7 +150,14 @@ impl MethodRules for Rules {
                     }
                     solids.push((Arc::new(made.solid), hull.reach, volume));
                     let pattern = made.pattern.map(|pattern| (pattern, None));
-                    objects.push(Object { name: thing.name.clone(), rows, mesh: made.mesh, birth: made.birth, pattern });
+                    objects.push(Object {
+                        name: thing.name.clone(),
+                        rows,
+                        mesh: made.mesh,
+                        birth: made.birth,
+                        sleeps: thing.sleeping,
+                        pattern,
+                    });
                 }
                 Err((key, message)) => builder.issues.push(Issue::new(format!("body \"{}\"{key}", thing.name), message)),
             }
@@ -182,6 +196,24 @@ impl MethodRules for Rules {
             builder.warnings.extend(deepest(&mut system));
         }
         Some(Box::new(system))
+    }
+}
+
+/// What would leave the plane of a scene of two dimensions; `axis` is across it.
+fn in_plane(thing: &Body, axis: usize, issues: &mut Vec<Issue>) {
+    let mut wrong = |key: &str, message: String| issues.push(Issue::new(format!("body \"{}\".{key}", thing.name), message));
+    for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
+        if let Some(v) = list.iter().find(|v| v[axis] != 0.0) {
+            wrong(key, off_plane(axis, v[axis]));
+        }
+    }
+    if let Some(w) = thing.angular_velocity.iter().find(|w| (0..3).any(|k| k != axis && w[k] != 0.0)) {
+        wrong("angular_velocity", format!("{w:?}, expected a turn about {} in a scene of dimension 2", ["x", "y", "z"][axis]));
+    }
+    for (key, given) in [("emit", thing.emit.is_some()), ("fracture", thing.fracture.is_some())] {
+        if given {
+            wrong(key, "it needs space; leave it out, or set dimension = 3".into());
+        }
     }
 }
 

@@ -25,6 +25,8 @@ pub struct Body {
     pub inertia: [f64; 3],
     /// Inverse inertia in the axes of the world: xx, yy, zz, xy, yz, zx [1/(kg m²)].
     pub inverse_inertia: [f64; 6],
+    /// The axis of the world across the plane in which it moves, if it moves in one.
+    pub across: Option<usize>,
 }
 
 impl Body {
@@ -32,14 +34,23 @@ impl Body {
     pub const WORLD: Self = {
         let zero = Vector { x: 0.0, y: 0.0, z: 0.0 };
         let q = Quat { v: zero, w: 1.0 };
-        Self { x: zero, q, v: zero, w: zero, inverse_mass: 0.0, inertia: [f64::INFINITY; 3], inverse_inertia: [0.0; 6] }
+        Self { x: zero, q, v: zero, w: zero, inverse_mass: 0.0, inertia: [f64::INFINITY; 3], inverse_inertia: [0.0; 6], across: None }
     };
 
     /// Angular momentum about the centre of mass [N m s].
     pub fn spin(&self) -> Vector {
         let w = self.q.conj().turn(self.w);
         let [a, b, c] = self.inertia;
-        self.q.turn([a * w.x, b * w.y, c * w.z].into())
+        let spin = self.q.turn([a * w.x, b * w.y, c * w.z].into());
+        self.across.map_or(spin, |axis| only(spin, axis))
+    }
+
+    /// Takes away what leads out of the plane in which it moves.
+    pub fn flatten(&mut self) {
+        if let Some(axis) = self.across {
+            self.v = self.v - only(self.v, axis);
+            self.w = only(self.w, axis);
+        }
     }
 
     /// Change of angular velocity by an angular impulse [N m s].
@@ -69,6 +80,13 @@ impl Body {
         if self.inverse_mass == 0.0 {
             return;
         }
+        if let Some(axis) = self.across {
+            let [x, y, z] = <[f64; 3]>::from(self.q.conj().turn(only([1.0; 3].into(), axis)));
+            let [a, b, c] = self.inertia;
+            self.inverse_inertia = [0.0; 6];
+            self.inverse_inertia[axis] = 1.0 / (a * x * x + b * y * y + c * z * z);
+            return;
+        }
         let [a, b, c] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| self.q.turn(Vector::from(e)));
         let [i, j, k] = self.inertia.map(|moment| 1.0 / moment);
         let sum = |f: fn(Vector) -> f64| i * f(a) + j * f(b) + k * f(c);
@@ -79,6 +97,10 @@ impl Body {
     /// Turns freely for h [s]: half a turn about one axis, a symmetric top's motion, which has a formula, and the other half. Keeps the angular
     /// momentum to round-off and the energy within O(h²); exact for two equal moments.                             (rigid.3)
     pub fn turn_freely(&mut self, h: f64) {
+        if self.across.is_some() {
+            self.q = (by(self.w * h) * self.q).normalized();
+            return;
+        }
         let inverse = self.inertia.map(|moment| 1.0 / moment);
         let apart = |a: usize, b: usize| (inverse[a] - inverse[b]).abs();
         // The top has the two moments that differ least.
@@ -103,4 +125,11 @@ impl Body {
     pub fn kinetic(&self) -> f64 {
         0.5 * (self.v.norm_sq() / self.inverse_mass + self.w.dot(self.spin()))
     }
+}
+
+/// The part of a vector along an axis.
+fn only(v: Vector, axis: usize) -> Vector {
+    let mut part = [0.0; 3];
+    part[axis] = <[f64; 3]>::from(v)[axis];
+    part.into()
 }

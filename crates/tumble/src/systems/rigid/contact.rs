@@ -208,14 +208,14 @@ fn angle(q: Quat<f64>) -> f64 {
 }
 
 impl Near {
-    /// All contacts that may close within h [s], in the order of their pairs, but for pairs that stay apart. Pairs that have hardly moved against
-    /// each other since they were looked at in this interval keep their points: which ones does not depend on other bodies.
-    pub fn contacts(&mut self, bodies: &Bodies, h: f64, apart: &[[u32; 2]]) -> Vec<Contact> {
+    /// All contacts that may close within h [s], in the order of their pairs, but for pairs that stay apart or at rest. Pairs that have hardly moved
+    /// against each other since they were looked at in this interval keep their points: which ones does not depend on other bodies.
+    pub fn contacts(&mut self, bodies: &Bodies, h: f64, apart: &[[u32; 2]], rests: impl Fn([u32; 2]) -> bool + Sync) -> Vec<Contact> {
         let margins: Vec<f64> = (0..bodies.rows.len()).map(|i| margin(bodies, i, h)).collect();
         self.gather(bodies, &margins, apart);
         let found = self.seen.chunks_mut(PAIRS).map_in_parallel(|pairs| {
             let mut contacts = Vec::new();
-            for seen in pairs {
+            for seen in pairs.iter_mut().filter(|seen| !rests(seen.pair)) {
                 let [i, j] = seen.pair.map(|i| i as usize);
                 let within = margins[i] + margins[j];
                 if seen.within < within || !seen.still(bodies) {

@@ -160,7 +160,12 @@ impl Asker<'_> {
             Way::Along(e) => (Lever::new(self.bodies, self.arms, e), a.inverse_mass + b.inverse_mass),
             Way::About(e) => (Lever::about(self.bodies, e), 0.0),
         };
-        let mass = 1.0 / (lever.compliance(&lever, moved) + give);
+        let compliance = lever.compliance(&lever, moved) + give;
+        if compliance == 0.0 {
+            // In a plane nothing turns about an axis that lies in it.
+            return;
+        }
+        let mass = 1.0 / compliance;
         self.out.push(Row { joint: self.joint, pair: self.pair, lever, target, give, bounds, mass, impulse: 0.0, answer: None });
     }
 

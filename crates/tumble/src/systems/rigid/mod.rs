@@ -17,6 +17,7 @@ mod joint;
 mod lever;
 mod overlap;
 mod pattern;
+mod sleep;
 mod solids;
 mod solve;
 mod wide;
@@ -39,6 +40,7 @@ use contact::{CONTACT, Contact, Near};
 use fracture::{Cracked, Fractures};
 use joint::Joints;
 use lever::Pace;
+use sleep::Sleep;
 use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
@@ -64,6 +66,8 @@ pub struct Object {
     pub mesh: Mesh,
     /// How they are born, if that is during the run.
     pub birth: Option<Birth>,
+    /// Whether they sleep where they have come to rest.
+    pub sleeps: bool,
     /// How they break, if they do, and the first of their surfaces at the exchange, if others touch them.
     pub pattern: Option<(Arc<Pattern>, Option<usize>)>,
 }
@@ -107,6 +111,7 @@ pub struct Rigid {
     ends: Vec<Ends>,
     joints: Joints,
     contacts: Vec<Contact>,
+    sleep: Sleep,
     /// What this interval knows of pairs.
     near: Near,
     /// Of constant forces, over this interval.
@@ -124,8 +129,10 @@ impl Rigid {
             cracked.flat_map(|(rows, pattern)| rows.step_by(pattern.pieces.len()).map(|first| Cracked::new(pattern.clone(), first)));
         let fractures = Fractures::new(cracked.collect(), &joints);
         let born = |object: &Object| Births { born: if object.birth.is_some() { 0 } else { object.rows.len() / object.each() }, tried: 0 };
+        let sleeps = |i: usize| objects.iter().any(|object| object.sleeps && object.rows.contains(&i));
         Self {
             births: objects.iter().map(born).collect(),
+            sleep: Sleep::new((0..bodies.moving).map(sleeps).collect()),
             joints: Joints::new(joints, bodies.moving),
             settings,
             objects,
@@ -143,7 +150,10 @@ impl Rigid {
     /// The two surfaces that overlap most at the start, by more than round-off, the index of the first, if its object has several, and how deep [m].
     pub fn overlap(&mut self) -> Option<(&str, Option<usize>, &str, f64)> {
         self.place_solids(0.0, 0.0);
-        let found = Near::default().contacts(&self.bodies, 0.0, &self.joints.apart()).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+        let found = Near::default()
+            .contacts(&self.bodies, 0.0, &self.joints.apart(), |_| false)
+            .into_iter()
+            .min_by(|a, b| a.gap.total_cmp(&b.gap))?;
         let [a, b] = found.pair.map(|i| i as usize);
         let least = OVERLAP * self.bodies.hulls[self.bodies.hull[a] as usize].reach;
         let (object, row) = self.owner(a)?;
@@ -249,6 +259,9 @@ impl Rigid {
     /// Gives bodies a part of their impulses.
     fn push(&mut self, pushes: &[Push], part: f64) {
         for push in pushes {
+            if [push.impulse, push.moment] != [Vector::default(); 2] {
+                self.sleep.wake(push.row);
+            }
             let body = &mut self.bodies.rows[push.row];
             body.orient();
             let impulse = push.impulse * part;
@@ -292,12 +305,24 @@ impl Rigid {
         self.bear(t);
         let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
         let moving = self.bodies.moving;
-        for body in self.bodies.rows[..moving].iter_mut().filter(|body| body.inverse_mass > 0.0) {
-            body.orient();
-            body.v = body.v + gravity * h;
+        self.sleep.look(&self.bodies, &self.contacts, gravity);
+        let mut falls: Vec<usize> = (0..moving).filter(|i| self.bodies.is_there(*i) && !self.sleep.is_asleep(*i)).collect();
+        let mut contacts = Vec::new();
+        while !falls.is_empty() {
+            for i in falls {
+                let body = &mut self.bodies.rows[i];
+                body.orient();
+                body.v = body.v + gravity * h;
+            }
+            contacts = self.near.contacts(&self.bodies, h, &self.joints.apart(), |pair| self.sleep.rests(pair));
+            // What comes near wakes all that hangs together with it.
+            falls = self.sleep.spread(&contacts);
+            if !falls.is_empty() {
+                falls.extend(self.sleep.spread(&self.contacts));
+            }
         }
-        let mut contacts = self.near.contacts(&self.bodies, h, &self.joints.apart());
         contact::carry(&self.bodies, &self.contacts, &mut contacts);
+        let awake: Vec<bool> = (0..moving).map(|i| self.bodies.is_there(i) && !self.sleep.is_asleep(i)).collect();
         let pace = Pace { t, h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
         let rows = &mut self.bodies.rows;
         let blows = solve::bounce(rows, &contacts, &pace);
@@ -313,15 +338,22 @@ impl Rigid {
             joints.held().for_each(|i| held[i as usize] = true);
             contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| held[i as usize] = true);
             let all = rows[..moving].iter_mut().zip(held).zip(hangs).zip(gains);
-            for (((body, held), hangs), gain) in all.filter(|(((body, _), _), _)| body.inverse_mass > 0.0) {
+            for ((((body, held), hangs), gain), _) in all.zip(&awake).filter(|(_, awake)| **awake) {
+                body.flatten();
                 body.x = body.x + body.v * h - if held { Vector::default() } else { (gravity * h + *gain) * (0.5 * h) };
                 body.turn_freely(h);
                 body.orient();
                 body.v = body.v + if hangs { half } else { Vector::default() };
             }
         });
+        self.bodies.rows[..moving].iter_mut().for_each(Body::flatten);
+        if self.sleep.any() {
+            contacts.extend(self.contacts.drain(..).filter(|contact| self.sleep.rests(contact.pair)));
+            contacts.sort_by_key(|contact| contact.pair);
+        }
         self.contacts = contacts;
         self.crack(&blows, h);
+        self.sleep.rest(&mut self.bodies, &self.contacts, self.joints.held(), gravity, h);
     }
 
     /// Which bodies a solid or the world holds, directly or by other bodies; all others fall, whatever they do to each other.
@@ -486,7 +518,7 @@ impl System for Rigid {
     }
 
     fn version(&self) -> u32 {
-        3
+        4
     }
 
     fn absorb(&mut self, exchange: &mut Turn<'_>) {
@@ -668,12 +700,17 @@ impl System for Rigid {
         archive.push_indices("births", &births);
         let broken: Vec<u8> = self.fractures.all.iter().flat_map(|cracked| &cracked.broken).map(|broken| u8::from(*broken)).collect();
         archive.push("broken", Part::Bytes(broken));
+        for (name, numbers) in ["still", "around"].into_iter().zip(self.sleep.numbers()) {
+            archive.push(name, Part::Numbers(numbers.to_vec()));
+        }
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let (bodies, pairs, contacts) = (archive.numbers("bodies")?, archive.indices("pairs")?, archive.numbers("contacts")?);
         let joints = archive.numbers("joints")?;
-        let (births, broken) = (archive.indices("births")?, archive.bytes("broken")?);
+        let (births, broken) = (archive.indices("births")?, archive.bytes("broken")?.to_vec());
+        let (still, around) = (archive.numbers("still")?, archive.numbers("around")?);
+        self.sleep.restore(&still, &around)?;
         // Of an interval that was cut short.
         self.steady.clear();
         if bodies.len() != BODY * self.bodies.moving
@@ -693,7 +730,7 @@ impl System for Rigid {
         for (own, s) in self.births.iter_mut().zip(births.chunks_exact(2)) {
             *own = Births { born: s[0] as usize, tried: s[1] };
         }
-        self.fill(broken);
+        self.fill(&broken);
         for (joint, s) in self.joints.all.iter_mut().zip(joints.chunks_exact(JOINT)) {
             (joint.broken, joint.load) = (s[0] == 1.0, [three(&s[1..]), three(&s[4..])]);
         }
@@ -712,6 +749,7 @@ impl System for Rigid {
         if !matches!(column, "position" | "velocity" | "angular_velocity" | "turn") || values.len() != width * rows.len() {
             return Some(false);
         }
+        self.sleep.wake_all();
         for (body, s) in self.bodies.rows[rows].iter_mut().zip(values.chunks_exact(width)) {
             match column {
                 "turn" => body.q = Quat { v: [s[0], s[1], s[2]].into(), w: s[3] }.normalized(),

@@ -83,5 +83,6 @@ pub fn body(solid: &Collider, t: f64, h: f64) -> Body {
         inverse_mass: 0.0,
         inertia: [f64::INFINITY; 3],
         inverse_inertia: [0.0; 6],
+        across: None,
     }
 }
