@@ -57,7 +57,7 @@ class Ledger(TypedDict):
     waiting: int | None
     """Births that are due, and wait for room."""
     broken: int | None
-    """Links broken so far."""
+    """Links, joints and faces of glue between pieces that have broken so far."""
     heat: float | None
     """Heat in bodies, above that at the start [J]; in a plane for a metre across it."""
     heat_in: float | None

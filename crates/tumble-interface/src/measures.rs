@@ -305,7 +305,7 @@ measures! {
         contacts: Option<u64> = Measure { columns: &["contacts"], ..STATE };
         /// Births that are due, and wait for room.
         waiting: Option<u64> = Measure { columns: &["waiting"], ..STATE };
-        /// Links broken so far.
+        /// Links, joints and faces of glue between pieces that have broken so far.
         broken: Option<u64> = Measure { columns: &["broken"], ..STATE };
         /// Heat in bodies, above that at the start; in a plane for a metre across it.
         heat: Option<f64> = Measure { unit: "J", signed: true, columns: &["heat"], ..STATE };

@@ -33,7 +33,7 @@ export interface Ledger {
   contacts: number | null;
   /** Births that are due, and wait for room. */
   waiting: number | null;
-  /** Links broken so far. */
+  /** Links, joints and faces of glue between pieces that have broken so far. */
   broken: number | null;
   /** Heat in bodies, above that at the start [J]; in a plane for a metre across it. */
   heat: number | null;
