@@ -7,7 +7,7 @@ use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::scene::plausible::odd_density;
 use crate::system::System;
-use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Overlaps, STEP, Settings, longest_step};
+use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Overlaps, Settings, longest_step, settling_step};
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
@@ -56,14 +56,15 @@ fn refuse_softness(scene: &Scene, issues: &mut Vec<Issue>) {
 
 /// The longest step that resolves all contacts of a system [s].
 fn step(scene: &Scene, plan: &Plan) -> f64 {
-    if scheme(plan) == GrainScheme::Positions {
-        return STEP;
-    }
     let own = scene.grains.iter().filter(|t| is_in(&t.system, plan));
     let of = |t: &Grains| {
         // The matter of a clump is borne by all of its spheres.
         let [least, share, count] = t.clump.as_ref().and_then(recipes::crowded).unwrap_or([1.0; 3]);
-        longest_step(law(plan), &material(t), least * t.radius * (1.0 - t.radius_spread), share * t.density, count)
+        let radius = least * t.radius * (1.0 - t.radius_spread);
+        match scheme(plan) {
+            GrainScheme::Forces => longest_step(law(plan), &material(t), radius, share * t.density, count),
+            GrainScheme::Positions => settling_step(radius),
+        }
     };
     own.map(of).fold(f64::INFINITY, f64::min)
 }

@@ -3,9 +3,8 @@
 use super::law::{BALL, Memory, Pair};
 use crate::math::{Lane, Vec3};
 
-/// Overlap over 2 R* that is left, so that what rests keeps touching, and the part of what is beyond that a step takes away.
+/// Overlap over 2 R* that is left, so that what rests keeps touching.
 const SLOP: f64 = 0.005;
-const TAKEN: f64 = 0.5;
 /// Velocity that a ball gains at its surface, along it, over that of its centre: it turns, too.
 const ALONG: f64 = 1.0 + 1.0 / BALL;
 
@@ -69,7 +68,7 @@ impl<L: Lane> Pair<L> {
             }
         }
         let deep = (-at.gap - at.radius * h.like(2.0 * SLOP)).above_zero();
-        Push { impulse: memory.slip, couple: memory.turn, shift: deep * h.like(TAKEN) / across }
+        Push { impulse: memory.slip, couple: memory.turn, shift: deep / across }
     }
 }
 

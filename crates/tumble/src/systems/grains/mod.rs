@@ -18,7 +18,7 @@ mod walls;
 
 pub use clumps::{Clump, Clumps};
 pub use law::{Material, longest_step};
-pub use positions::STEP;
+pub use positions::settling_step;
 pub use pour::Pour;
 
 use crate::exchange::Turn;
@@ -524,6 +524,7 @@ impl System for Grains {
             normal: three(s),
             memory: Memory { slip: three(&s[3..]), turn: three(&s[6..]), slides: s[10] },
             depth: s[9],
+            fresh: false,
         };
         self.walls.remember(keys.chunks_exact(2).zip(kept.chunks_exact(WALL)).map(contact).collect());
         Some(())

@@ -20,12 +20,22 @@ use crate::math::parallel::{CHUNK, Tasks};
 use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Lane, Real, Row};
 
-/// The longest step, unless the scene says so [s].
-pub const STEP: f64 = 5e-4;
+/// The longest step, unless the scene says so, over the time in which a grain falls by its radius.
+const STEP: f64 = 0.009;
 /// How near contacts are looked for, over the way after which candidates are sought anew under forces.
 const NEAR: f64 = 0.9;
 /// Passes over all contacts in a step.
 pub const PASSES: u32 = 2;
+/// Parts of a grain, over the number of its contacts: half or less would not converge where all contacts of a grain push it one way.
+const SPLIT: Real = 0.7;
+/// Marks contacts that nothing has pressed in the step before.
+const FRESH: u32 = 1 << 31;
+
+/// The longest step of grains with this radius at least [m] that are to settle [s].
+pub fn settling_step(radius: f64) -> f64 {
+    const G: f64 = 9.81;
+    STEP * (2.0 * radius / G).sqrt()
+}
 
 /// What a pass reads.
 struct Rows<'a> {
@@ -94,7 +104,8 @@ impl Rows<'_> {
             let (reach, near) = (a[3] + b[3], a[3] + b[3] + self.near);
             let touches = far + 2.0 * self.step.h * closing.min(0.0) < reach * reach && far < near * near;
             if touches {
-                list.hits.push(k as u32);
+                let rested = list.slips[k][..3] != [0.0; 3];
+                list.hits.push(k as u32 | if rested { 0 } else { FRESH });
                 for row in [i, j] {
                     if let Some(count) = counts.get_mut((row as usize).wrapping_sub(start)) {
                         *count += 1;
@@ -175,7 +186,7 @@ impl Pass<'_, '_> {
     fn load(&self, at: usize, count: usize, batch: &mut Batch) {
         let Rows { w: kinds_of, pairs, kinds, .. } = *self.rows;
         for l in 0..count {
-            let k = self.list.hits[at + l] as usize;
+            let (k, fresh) = ((self.list.hits[at + l] & !FRESH) as usize, self.list.hits[at + l] & FRESH != 0);
             let [i, j] = self.list.rows[k];
             let (way, gap) = self.rows.way([i, j]);
             batch.rows[0][l] = i;
@@ -185,6 +196,7 @@ impl Pass<'_, '_> {
             if !self.list.turns.is_empty() {
                 batch.turns[l] = self.list.turns[k];
             }
+            batch.turns[l][3] = if fresh { 1.0 } else { 0.0 };
             if kinds > 1 {
                 let numbers = pairs[kinds_of[i as usize][3] as usize * kinds + kinds_of[j as usize][3] as usize].numbers();
                 for c in 0..NUMBERS {
@@ -226,7 +238,8 @@ impl Pass<'_, '_> {
             gap,
             normal,
             velocity: moves - (spins[0] * arms[0] + spins[1] * arms[1]).cross(normal),
-            before: (moves - three(second_gain) + three(first_gain)).dot(normal),
+            // What is pressed already does not bounce.
+            before: (moves - three(second_gain) + three(first_gain)).dot(normal) * turn[3],
             turning: spins[1] - spins[0],
             radius: radii[0] * radii[1] / (radii[0] + radii[1]),
             yields: [across, across * along, (first[3] / (radii[0] * radii[0]) + second[3] / (radii[1] * radii[1])) * turning],
@@ -242,7 +255,7 @@ impl Pass<'_, '_> {
         put(w, normal * push.shift, one.zero(), &mut batch.pushes[3]);
         put(w, memory.turn, one.zero(), &mut batch.turns);
         for l in 0..count {
-            let k = self.list.hits[at + l] as usize;
+            let k = (self.list.hits[at + l] & !FRESH) as usize;
             self.list.slips[k] = batch.pushes[0][l];
             if turns {
                 self.list.turns[k] = batch.turns[l];
@@ -349,12 +362,12 @@ impl Bed {
         self.list.parts = parts;
     }
 
-    /// Takes each grain for as many parts as it has contacts.
+    /// Takes each grain for parts, as it has contacts.
     fn split(&mut self) {
         let Self { quick, counts, .. } = self;
         quick.chunks_mut(QUICK * CHUNK).zip(counts.chunks(CHUNK)).in_parallel(|(quick, counts)| {
             for (quick, count) in quick.chunks_exact_mut(QUICK).zip(counts) {
-                quick[0][3] *= (*count).max(1) as Real;
+                quick[0][3] *= (SPLIT * *count as Real).max(1.0);
             }
         });
     }

@@ -28,6 +28,8 @@ pub struct WallContact {
     pub normal: Vector,
     pub memory: Memory,
     pub depth: f64,
+    /// By positions: whether nothing has pressed it in the step before.
+    pub fresh: bool,
 }
 
 /// What a body gets: its number, the place, force [N], couple [N m] and the normal away from it.
@@ -295,7 +297,7 @@ impl Walls {
                         let moment = arm.cross(answer.force) + answer.moment;
                         add(&mut force[local], answer.force);
                         add(&mut torque[local], moment);
-                        part.contacts.push(WallContact { row: *row, surface: *surface, normal, memory, depth });
+                        part.contacts.push(WallContact { row: *row, surface: *surface, normal, memory, depth, fresh: false });
                         if let Some((body, _)) = body {
                             part.pushes.push(Push { body, point: place, force: -answer.force, couple: -answer.moment, normal });
                         }

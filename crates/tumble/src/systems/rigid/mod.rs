@@ -307,6 +307,9 @@ impl Rigid {
         let moving = self.bodies.moving;
         self.sleep.look(&self.bodies, &self.contacts, gravity);
         let mut falls: Vec<usize> = (0..moving).filter(|i| self.bodies.is_there(*i) && !self.sleep.is_asleep(*i)).collect();
+        if falls.is_empty() {
+            return;
+        }
         let mut contacts = Vec::new();
         while !falls.is_empty() {
             for i in falls {

@@ -117,7 +117,8 @@ impl Walls {
                     let known = free.max_by(|a, b| like(a).total_cmp(&like(b)));
                     taken |= known.map_or(0, |k| 1 << k);
                     let memory = known.map_or_else(Memory::default, |k| same[k].memory);
-                    part.contacts.push(WallContact { row: *row, surface: *surface, normal, memory, depth: radius - distance });
+                    let fresh = memory.slip == Vector::default();
+                    part.contacts.push(WallContact { row: *row, surface: *surface, normal, memory, depth: radius - distance, fresh });
                     counts[i - c * chunk] += 1;
                 });
             }
@@ -178,7 +179,8 @@ impl Walls {
             gap: -contact.depth,
             normal,
             velocity: rel,
-            before: (v - gain - before).dot(normal),
+            // What is pressed already does not bounce.
+            before: if contact.fresh { (v - gain - before).dot(normal) } else { 0.0 },
             turning: spin - turn,
             radius,
             yields,
