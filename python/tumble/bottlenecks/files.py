@@ -55,7 +55,11 @@ def scene(path: Path, scale: float, people: int | None) -> dict[str, Any]:
             name = str(words.get("name") or f"{kind} {len(plan[kind]) + 1}")
             plan[kind].append({"name": name, "from": points[0], "to": points[1]})
     kinds = {kind for kind, _, _ in found}
-    wrong += [f"no {kind} in it; mark lines with kind {', '.join(KINDS)}" for kind in ("wall", "exit", "start") if kind not in kinds]
+    wrong += [
+        f"no {kind} in it; mark lines with kind {', '.join(KINDS)}"
+        for kind in ("wall", "exit", "start")
+        if kind not in kinds
+    ]
     across = [scale * p[a] for wall in plan["walls"] for p in wall for a in (0, 1)]
     if across and max(across) - min(across) < LEAST:
         wrong.append(f"walls span {max(across) - min(across):.3g} m; give the metres in a unit of it by --scale")
@@ -76,7 +80,9 @@ def _crowds(path: Path, starts: list[tuple[Points, Mapping[str, Any]]], people: 
     """A crowd for each start area; people without a place of their own by area."""
     open_ = [_area(points) for points, words in starts if not {"count", "density"} & words.keys()]
     if open_ and people is None:
-        raise SceneError(f"{path}: {len(open_)} start areas have no count; give one to each, or --people N for all of them")
+        raise SceneError(
+            f"{path}: {len(open_)} start areas have no count; give one to each, or --people N for all of them"
+        )
     crowds, before, done = [], 0.0, 0
     for k, (points, words) in enumerate(starts):
         crowd: dict[str, Any] = {"name": str(words.get("name") or f"people {k + 1}"), "area": points}
@@ -115,9 +121,13 @@ def _geojson(text: str) -> Found:
         kind = words.get("kind")
         if kind not in KINDS:
             continue
-        many = {"LineString": lambda c: [c], "MultiLineString": lambda c: c, "Polygon": lambda c: c}.get(geometry.get("type"))
+        many = {"LineString": lambda c: [c], "MultiLineString": lambda c: c, "Polygon": lambda c: c}.get(
+            geometry.get("type")
+        )
         if many is None:
-            raise ValueError(f"features[{k}]: a {geometry.get('type')}, expected a LineString, MultiLineString or Polygon")
+            raise ValueError(
+                f"features[{k}]: a {geometry.get('type')}, expected a LineString, MultiLineString or Polygon"
+            )
         for line in many(geometry.get("coordinates") or []):
             points = [[_number(x) for x in point[:2]] for point in line]
             if kind == "start":
@@ -144,7 +154,9 @@ def _elements(element: ElementTree.Element, around: str | None) -> Found:
     said = " ".join([element.get("class", ""), element.get("id", ""), label]).lower()
     kind = next((kind for kind in KINDS if re.search(rf"\b{kind}s?\b|\b{kind}s?[-_ ]?\d", said)), around)
     if kind is not None and element.get("transform"):
-        raise ValueError(f"<{element.tag.rpartition('}')[2]}> {said.strip()} has a transform; apply it in the drawing program first")
+        raise ValueError(
+            f"<{element.tag.rpartition('}')[2]}> {said.strip()} has a transform; apply it in the drawing program first"
+        )
     if kind is not None:
         names = ("name", "count", "density")
         words = {name: element.get(f"data-{name}") for name in names if element.get(f"data-{name}") is not None}

@@ -74,7 +74,9 @@ def _map(found: Findings, cells: Any, title: str) -> bytes:
         axes = figure.add_subplot()
         top = float(np.quantile(cells[cells > 0], 0.99)) if (cells > 0).any() else 1.0
         shown = np.ma.masked_less_equal(cells, 0.0)
-        image = axes.imshow(shown, origin="lower", extent=extent, cmap="YlOrRd", vmin=0.0, vmax=top, interpolation="nearest")
+        image = axes.imshow(
+            shown, origin="lower", extent=extent, cmap="YlOrRd", vmin=0.0, vmax=top, interpolation="nearest"
+        )
         _walls(axes, found)
         axes.set_aspect("equal")
         axes.grid(False)
@@ -171,7 +173,13 @@ def _page(found: Findings) -> str:
     points += [f"with seed {seed} not all left in time" for seed in found.stuck]
     pictures = [("Ranked gates", "plan.png"), ("Waiting", "waiting.png"), ("Over time", "exits.png")]
     rows: Sequence[Sequence[str]] = [[str(k + 1), *map(escape, cells(row))] for k, row in enumerate(found.rows)]
-    sections = [Section("Table", "<p>Means and standard deviations over seeds.</p>", table=table(["rank", *map(escape, HEAD)], rows, (1, 2)))]
+    sections = [
+        Section(
+            "Table",
+            "<p>Means and standard deviations over seeds.</p>",
+            table=table(["rank", *map(escape, HEAD)], rows, (1, 2)),
+        )
+    ]
     drawn = [""]
     for title, name in pictures:
         sections.append(Section(title, ""))

@@ -13,14 +13,21 @@ from tumble.cli.console import say
 def bottlenecks(
     plan: Annotated[
         str,
-        typer.Argument(metavar="PLAN", help="A scene with a plan and a crowd, by file or name; or a .geojson or .svg drawing."),
+        typer.Argument(
+            metavar="PLAN", help="A scene with a plan and a crowd, by file or name; or a .geojson or .svg drawing."
+        ),
     ],
-    seeds: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Runs, with seeds counted from the scene's.")] = 10,
+    seeds: Annotated[
+        int, typer.Option(min=1, max=1000, metavar="N", help="Runs, with seeds counted from the scene's.")
+    ] = 10,
     widen: Annotated[
-        float, typer.Option(min=0.0, max=10.0, metavar="METRES", help="Make the first gates wider by this, and run again.")
+        float,
+        typer.Option(min=0.0, max=10.0, metavar="METRES", help="Make the first gates wider by this, and run again."),
     ] = 0.0,
     first: Annotated[int, typer.Option(min=1, metavar="N", help="How many gates --widen tries.")] = 3,
-    limit: Annotated[float, typer.Option(min=1.0, max=1e6, metavar="SECONDS", help="When a run ends at the latest.")] = 1800.0,
+    limit: Annotated[
+        float, typer.Option(min=1.0, max=1e6, metavar="SECONDS", help="When a run ends at the latest.")
+    ] = 1800.0,
     workers: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Runs at a time.", show_default="as many as cores")
     ] = None,
@@ -28,7 +35,8 @@ def bottlenecks(
         float, typer.Option(min=1e-6, max=1e6, metavar="METRES", help="Metres in a unit of a drawing.")
     ] = 1.0,
     people: Annotated[
-        int | None, typer.Option(min=1, max=1_000_000, metavar="N", help="People in the start areas of a drawing without counts.")
+        int | None,
+        typer.Option(min=1, max=1_000_000, metavar="N", help="People in the start areas of a drawing without counts."),
     ] = None,
     set: find.SetOption = None,
     out: Annotated[
@@ -75,9 +83,14 @@ def bottlenecks(
             | {name: getattr(row, name).__dict__ for name in names}
             for row in found.rows
         ]
-        changed = [{"gate": w.gate, "by": w.by, "saved": w.saved.__dict__, "earlier": w.earlier.__dict__} for w in found.widened]
+        changed = [
+            {"gate": w.gate, "by": w.by, "saved": w.saved.__dict__, "earlier": w.earlier.__dict__}
+            for w in found.widened
+        ]
         whole = {"last_out": found.last_out.__dict__, "lost": found.lost.__dict__}
-        find.say_json({"ok": not found.stuck, "rows": rows, "widened": changed, **whole, "stuck": found.stuck, "files": files})
+        find.say_json(
+            {"ok": not found.stuck, "rows": rows, "widened": changed, **whole, "stuck": found.stuck, "files": files}
+        )
     else:
         _say(found, files)
     if found.stuck:
@@ -97,11 +110,16 @@ def _say(found: "object", files: list[Path]) -> None:
     rows = [list(HEAD), *(cells(row) for row in found.rows)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
     for k, row in enumerate(rows):
-        text = [cell.ljust(width) if j < 2 else cell.rjust(width) for j, (cell, width) in enumerate(zip(row, widths, strict=True))]
+        text = [
+            cell.ljust(width) if j < 2 else cell.rjust(width)
+            for j, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
         say(f"{k if k else '':>4}  " + "  ".join(text).rstrip())
     say(f"last person out after {number(found.last_out, 1)} s, {number(found.lost, 0)} person-seconds lost")
     for w in found.widened:
-        say(f"{w.gate} wider by {w.by:g} m: {number(w.saved, 0)} person-seconds saved, last out {number(w.earlier, 1)} s earlier")
+        say(
+            f"{w.gate} wider by {w.by:g} m: {number(w.saved, 0)} person-seconds saved, last out {number(w.earlier, 1)} s earlier"
+        )
     for seed in found.stuck:
         say(f"seed {seed}: not all left in time")
     for file in files:

@@ -145,7 +145,7 @@ pub struct Walking {
 
 impl Default for Walking {
     fn default() -> Self {
-        Self { time_gap: 0.8, buffer: 0.1 }
+        Self { time_gap: 0.65, buffer: 0.04 }
     }
 }
 
@@ -154,7 +154,7 @@ fn one() -> f64 {
 }
 
 fn radius() -> f64 {
-    0.15
+    0.18
 }
 
 fn speed() -> f64 {

@@ -7,7 +7,7 @@ use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::system::System;
 use crate::systems::crowd::{
-    Crowd as People, Floor, Gate, Line, Misfit, Model, Person, Plan as Walls, Point, Room, Settings, nearest, reach,
+    Crowd as People, Floor, Gate, Line, Misfit, Model, Person, Plan as Walls, Point, Room, Settings, nearest, overlapping, reach,
 };
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
@@ -19,7 +19,9 @@ const PERSON: f64 = 600.0;
 /// Bytes for a cell of a floor, and for each way across it.
 const CELL: [f64; 2] = [9.0, 20.0];
 /// Side of a cell [m], at most, and over the smallest radius.
-const SIDE: [f64; 2] = [0.1, 0.67];
+const SIDE: [f64; 2] = [0.1, 0.6];
+/// Pieces of a wall that are compared with each other.
+const LONG: usize = 4000;
 /// A plan as wide as this [m] is in millimetres.
 const WIDE: f64 = 5000.0;
 
@@ -88,7 +90,8 @@ fn check_walls(thing: &Floors, issues: &mut Vec<Issue>) {
             continue;
         }
         let pieces = lines(std::slice::from_ref(wall));
-        let crossing = (0..pieces.len()).find_map(|i| (0..i).find_map(|j| cross(pieces[i], pieces[j])));
+        // Of very long ones only the beginning is looked at: all pairs are.
+        let crossing = (0..pieces.len().min(LONG)).find_map(|i| (0..i).find_map(|j| cross(pieces[i], pieces[j])));
         if let Some(x) = crossing {
             issues.push(Issue::new(path, format!("crosses itself at {}; mend the order of its points, or make two walls of it", at(x))));
         }
@@ -336,21 +339,18 @@ fn normal(random: &Random, i: u64) -> f64 {
 
 /// Given positions where somebody cannot be.
 fn check_places(thing: &Crowd, crowd: u32, floor: &Floor, people: &[Person], radius: &dyn Fn(usize) -> f64, issues: &mut Vec<Issue>) {
-    let mut there: Vec<(Point, f64)> = people.iter().map(|p| (p.x, p.radius)).collect();
+    let own = thing.position.iter().enumerate().map(|(i, x)| (*x, radius(i)));
+    let overlap = overlapping(&people.iter().map(|p| (p.x, p.radius)).chain(own).collect::<Vec<_>>());
     for (i, x) in thing.position.iter().enumerate() {
         let path = format!("crowd \"{}\".position[{i}]", thing.name);
         let clear = floor.plan.clearance(*x);
-        let apart = |(y, r): &(Point, f64)| ((x[0] - y[0]).powi(2) + (x[1] - y[1]).powi(2)).sqrt() >= r + radius(i);
         if clear < radius(i) {
-            issues.push(Issue::new(
-                path,
-                format!("{} m from a wall, but the body has a radius of {} m; move it", short(clear), short(radius(i))),
-            ));
+            let message = format!("{} m from a wall, but the body has a radius of {} m; move it", short(clear), short(radius(i)));
+            issues.push(Issue::new(path, message));
         } else if !floor.way(crowd).distance(*x).is_finite() {
             issues.push(Issue::new(path, "no exit of it can be reached from there; open a way, or name another exit"));
-        } else if !there.iter().all(apart) {
+        } else if overlap[people.len() + i] {
             issues.push(Issue::new(path, "overlaps somebody who stands there already; move it"));
         }
-        there.push((*x, radius(i)));
     }
 }

@@ -10,7 +10,7 @@ mod tally;
 mod way;
 
 pub use people::{Model, Person, reach};
-pub use place::{Misfit, Room};
+pub use place::{Misfit, Room, overlapping};
 pub use plan::{Gate, Line, Plan, Point, inside, nearest};
 pub use way::Floor;
 
@@ -22,12 +22,15 @@ use crate::system::{Archive, Part, System};
 use near::Near;
 use people::{Scratch, step};
 use plan::{length, sub};
-use tally::{Share, Tally, densities, queues};
+use tally::{Share, Tally, densities};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
 use tumble_interface::{Column, StepError};
 
 /// Longest step, unless given [s].
 pub const STEP: f64 = 0.05;
+
+/// How far anybody goes in a step, at most [m].
+const FAR: f64 = 0.5;
 
 /// What does not change about a system.
 pub struct Settings {
@@ -76,7 +79,7 @@ impl Crowd {
         self.before.extend(self.people.iter().map(|p| (p.x, p.phi)));
         step(&mut self.people, &self.floor, &self.settings.model, &mut self.scratch, t, h);
         let moves = &self.scratch.moves;
-        let queues = queues(&self.floor, &self.people, moves.iter().map(|to| to.gate));
+        let queues = self.tally.queues(&self.floor, &self.people, moves.iter().map(|to| to.gate), h);
         let (mut shares, mut gone) = (Vec::with_capacity(moves.len()), Vec::new());
         for ((p, to), (x, phi)) in self.people.iter_mut().zip(moves).zip(&self.before) {
             let out = self.tally.cross(&self.floor, &self.settings.exits[p.crowd as usize], *x, p.x, t, h);
@@ -141,7 +144,10 @@ impl System for Crowd {
 
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
-        let n = self.settings.substeps.unwrap_or(equal_steps(dt, self.settings.step.unwrap_or(STEP)) as u32);
+        let given = self.settings.substeps.unwrap_or(equal_steps(dt, self.settings.step.unwrap_or(STEP)) as u32);
+        // Nobody goes beyond the walls and gates of the lists in a step, however long it is to be.
+        let fastest = self.people.iter().map(|p| p.speed).fold(0.0, f64::max);
+        let n = given.max(equal_steps(dt * fastest.max(1e-9), FAR) as u32);
         let h = dt / f64::from(n);
         for k in 0..n {
             if !go_on() {
@@ -210,7 +216,7 @@ impl System for Crowd {
         let rows = self.people.iter().flat_map(|p| [p.x[0], p.x[1], p.v[0], p.v[1], p.heading, p.phi]);
         archive.push("rows", Part::Numbers(rows.collect()));
         archive.push_indices("crossed", &self.tally.crossed.concat());
-        let tally = [&self.tally.span.concat()[..], &self.tally.waited, &self.tally.lost, &[self.lost]].concat();
+        let tally = [&self.tally.span.concat()[..], &self.tally.waited, &self.tally.lost, &self.tally.pace, &[self.lost]].concat();
         archive.push("tally", Part::Numbers(tally));
     }
 
@@ -218,7 +224,7 @@ impl System for Crowd {
         let (ids, rows) = (archive.indices("people")?, archive.numbers("rows")?);
         let (crossed, tally) = (archive.indices("crossed")?, archive.numbers("tally")?);
         let gates = self.floor.plan.gates.len();
-        let fits = rows.len() == 6 * ids.len() && crossed.len() == 2 * gates && tally.len() == 4 * gates + 1;
+        let fits = rows.len() == 6 * ids.len() && crossed.len() == 2 * gates && tally.len() == 5 * gates + 1;
         if !fits || !ids.is_sorted_by(|a, b| a < b) || ids.last().is_some_and(|id| *id as usize >= self.all.len()) {
             return None;
         }
@@ -232,7 +238,8 @@ impl System for Crowd {
         self.tally.span = span.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
         self.tally.waited = rest[..gates].to_vec();
         self.tally.lost = rest[gates..2 * gates].to_vec();
-        self.lost = rest[2 * gates];
+        self.tally.pace = rest[2 * gates..3 * gates].to_vec();
+        self.lost = rest[3 * gates];
         Some(())
     }
 

@@ -1,7 +1,7 @@
 //! One step of people: where each turns to, how fast it goes, and how far it can go before it meets others.
 //!
 //! Source: [tordeux2016], with steering by rotation, after the description of the third version of that model in the documentation of
-//! JuPedSim, [jupedsim].
+//! JuPedSim, [jupedsim2026].
 
 use super::near::Near;
 use super::plan::{Plan, Point, along, cross, dot, length, nearest, sub};
@@ -161,23 +161,22 @@ impl Around<'_> {
     }
 
     /// Room ahead in a direction [m].                                                                 (crowds.4)
-    fn room(&self, e: Point, heading: Point) -> f64 {
+    fn room(&self, e: Point) -> f64 {
         let mut room = f64::INFINITY;
         for (r, d, other) in self.others {
             let reach = self.me.radius + other.radius;
             let ahead = dot(e, *r);
             let gap = d - reach;
-            if ahead > 0.0 && cross(e, *r).abs() <= reach && gap < room && !self.goes_first(*r, heading, other) && self.sees(*r) {
+            if ahead > 0.0 && cross(e, *r).abs() <= reach && gap < room && !self.goes_first(*r, other) && self.sees(*r) {
                 room = gap;
             }
         }
         room
     }
 
-    /// Of two who go the same way and are in each other's way, the one with less way left goes first.
-    fn goes_first(&self, r: Point, heading: Point, other: &Other) -> bool {
-        let mutual = dot(other.e, r) < 0.0 && dot(other.e, heading) > 0.0;
-        mutual && (self.me.phi, self.me.id) < (other.phi, other.id)
+    /// Of two who are in each other's way, the one with less way left goes first.
+    fn goes_first(&self, r: Point, other: &Other) -> bool {
+        dot(other.e, r) < 0.0 && (self.me.phi, self.me.id) < (other.phi, other.id)
     }
 
     /// Way made for those who go first and touch: away from them.                                     (crowds.6)
@@ -278,7 +277,7 @@ fn one(around: &Around<'_>, way: &Way, model: &Model, h: f64) -> (Point, f64) {
     let aim = [cos(target), sin(target)];
     let heading = me.heading + (h / RELAX).min(1.0) * atan2(cross(now, aim), dot(now, aim));
     let e = [cos(heading), sin(heading)];
-    let room = (1.0 - BLEND) * around.room(e, now).min(1e6) + BLEND * around.room(wanted, now).min(1e6);
+    let room = (1.0 - BLEND) * around.room(e).min(1e6) + BLEND * around.room(wanted).min(1e6);
     let v = ((room - model.buffer) / model.time_gap).clamp(BACK, me.speed);
     let u = along(around.makes_way(), v, e);
     (around.feasible(u.map(|u| u * h)), heading)

@@ -85,10 +85,26 @@ impl Room<'_> {
 
     /// Whether bodies fit somewhere in the area, but nowhere with a way.
     fn is_cut_off(&self, floor: &Floor, low: Point, high: Point) -> bool {
-        let mut fit = lattice(low, high, 0.5 * self.radius).filter(|x| inside(self.polygon, *x) && floor.plan.clearance(*x) >= self.radius);
+        let step = (0.5 * self.radius).max(((high[0] - low[0]) * (high[1] - low[1])).sqrt() / 300.0);
+        let mut fit = lattice(low, high, step).filter(|x| inside(self.polygon, *x) && floor.plan.clearance(*x) >= self.radius);
         let first = fit.next();
         first.is_some() && first.into_iter().chain(fit).all(|x| floor.way(self.crowd).distance(x).is_infinite())
     }
+}
+
+/// Whether each disk, a place and a radius, overlaps an earlier one.
+pub fn overlapping(disks: &[(Point, f64)]) -> Vec<bool> {
+    let most = disks.iter().map(|(_, r)| *r).fold(0.0, f64::max);
+    let mut near = Near::default();
+    near.sort(1.0, disks.iter().map(|(x, _)| *x));
+    let overlaps = |(i, (x, r)): (usize, &(Point, f64))| {
+        let meets = |row: &u32| {
+            let (y, other) = disks[*row as usize];
+            (*row as usize) < i && length(sub(*x, y)) < r + other
+        };
+        near.runs(*x, r + most).any(|run| near.order[run].iter().any(meets))
+    };
+    disks.iter().enumerate().map(overlaps).collect()
 }
 
 /// A triangular lattice over a box.

@@ -4,11 +4,13 @@
 //! It is charged to the next gate on the way, unless people beyond that gate stand, too: then the queue is that of theirs.
 
 use super::people::Person;
-use super::plan::{Point, crossing};
+use super::plan::{Point, crossing, length};
 use super::way::{Floor, NEAR, NONE, in_sight};
 
-/// People beyond a gate, at least, of whom most must wait for its queue to be that of the next.
-const FEW: u32 = 2;
+/// Mean speed of people beyond a gate over their desired ones, below which its queue is that of the next gate.
+const SLOW: f64 = 0.45;
+/// Time over which it is a mean [s].
+const MEMORY: f64 = 2.0;
 
 /// Counts of all gates.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -21,6 +23,8 @@ pub struct Tally {
     pub waited: Vec<f64>,
     /// Time lost [s], of all people together.
     pub lost: Vec<f64>,
+    /// Speed of people just beyond each gate over their desired ones, a mean over the last seconds.
+    pub pace: Vec<f64>,
 }
 
 /// What a step meant to somebody.
@@ -36,7 +40,13 @@ pub struct Share {
 impl Tally {
     /// Counts of so many gates.
     pub fn new(gates: usize) -> Self {
-        Self { crossed: vec![[0; 2]; gates], span: vec![[f64::NAN; 2]; gates], waited: vec![0.0; gates], lost: vec![0.0; gates] }
+        Self {
+            crossed: vec![[0; 2]; gates],
+            span: vec![[f64::NAN; 2]; gates],
+            waited: vec![0.0; gates],
+            lost: vec![0.0; gates],
+            pace: vec![1.0; gates],
+        }
     }
 
     /// Counts the gates that a step of h [s] from t crosses, and says which exit ends it, and at which part of the step.
@@ -58,6 +68,47 @@ impl Tally {
         None
     }
 
+    /// For each gate the one whose queue people before it stand in: itself, or the next of most who are slow beyond it. h is the step [s].
+    pub fn queues(&mut self, floor: &Floor, people: &[Person], next: impl Iterator<Item = u32>, h: f64) -> Vec<u32> {
+        // Gate, next gate, and pace of those beyond it.
+        let mut beyond = Vec::new();
+        for (p, next) in people.iter().zip(next).filter(|(p, next)| p.started && *next != NONE) {
+            for &g in floor.plan.gates_near(p.x).iter().filter(|g| **g != next) {
+                let gate = &floor.plan.gates[g as usize];
+                if p.phi < floor.gate(p.crowd, g as usize) && in_sight(&floor.plan, gate, p.x, NEAR).is_some() {
+                    beyond.push((g, next, (length(p.v) / p.speed).min(1.0)));
+                }
+            }
+        }
+        beyond.sort_by_key(|(g, next, _)| (*g, *next));
+        let count = self.pace.len();
+        let (mut now, mut queue) = (vec![1.0; count], (0..count as u32).collect::<Vec<u32>>());
+        for of in beyond.chunk_by(|a, b| a.0 == b.0) {
+            let g = of[0].0 as usize;
+            now[g] = of.iter().map(|(_, _, pace)| pace).sum::<f64>() / of.len() as f64;
+            let most = of.chunk_by(|a, b| a.1 == b.1).fold(&of[..0], |most, of| if of.len() > most.len() { of } else { most });
+            queue[g] = most[0].1;
+        }
+        for (g, (pace, now)) in self.pace.iter_mut().zip(now).enumerate() {
+            *pace += (h / MEMORY).min(1.0) * (now - *pace);
+            if *pace >= SLOW {
+                queue[g] = g as u32;
+            }
+        }
+        let last = |g: u32| {
+            // In a circle of queues each is its own.
+            let mut at = g;
+            for _ in 0..count {
+                if queue[at as usize] == at {
+                    return at;
+                }
+                at = queue[at as usize];
+            }
+            g
+        };
+        (0..count as u32).map(last).collect()
+    }
+
     /// Charges everybody's step to gates.
     pub fn charge(&mut self, shares: &[Share], queues: &[u32]) {
         for share in shares.iter().filter(|share| share.gate != NONE) {
@@ -66,44 +117,6 @@ impl Tally {
             self.waited[g] += share.waited;
         }
     }
-}
-
-/// For each gate the one whose queue people before it stand in: itself, or one beyond whose queue reaches back through it.
-pub fn queues(floor: &Floor, people: &[Person], gates: impl Iterator<Item = u32>) -> Vec<u32> {
-    let count = floor.plan.gates.len();
-    let (mut all, mut votes) = (vec![0; count], Vec::new());
-    for (p, next) in people.iter().zip(gates).filter(|(_, next)| *next != NONE) {
-        for &g in floor.plan.gates_near(p.x).iter().filter(|g| **g != next) {
-            let gate = &floor.plan.gates[g as usize];
-            if p.phi < floor.gate(p.crowd, g as usize) && in_sight(&floor.plan, gate, p.x, NEAR).is_some() {
-                all[g as usize] += 1;
-                if p.waits() {
-                    votes.push((g, next));
-                }
-            }
-        }
-    }
-    votes.sort_unstable();
-    let mut queue: Vec<u32> = (0..count as u32).collect();
-    for of in votes.chunk_by(|a, b| a.0 == b.0) {
-        let g = of[0].0;
-        if all[g as usize] >= FEW && 2 * of.len() as u32 > all[g as usize] {
-            let most = of.chunk_by(|a, b| a == b).fold(&of[..0], |most, of| if of.len() > most.len() { of } else { most });
-            queue[g as usize] = most[0].1;
-        }
-    }
-    let last = |g: u32| {
-        // In a circle of queues each is its own.
-        let mut at = g;
-        for _ in 0..count {
-            if queue[at as usize] == at {
-                return at;
-            }
-            at = queue[at as usize];
-        }
-        g
-    };
-    (0..count as u32).map(last).collect()
 }
 
 /// People on the floor near each gate, over its area, on the side where there are more [1/m²].
