@@ -3,6 +3,6 @@
 `study` runs a plan with several seeds, `Findings.rows` is the ranking. See docs/theory/crowds.md.
 """
 
-from tumble.bottlenecks.study import Findings, Rank, Widened, study
+from tumble.bottlenecks.runs import Findings, Rank, Widened, study
 
 __all__ = ["Findings", "Rank", "Widened", "study"]

@@ -30,7 +30,7 @@ FPS = 20
 
 
 def scene(path: Path, scale: float, people: int | None) -> dict[str, Any]:
-    """The scene of a drawing, `scale` metres in a unit of it. `people` are spread over start areas without a count of their own.
+    """The scene of a drawing, `scale` metres in a unit of it. `people` are spread over start areas without a count.
     Raises SceneError."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -86,10 +86,13 @@ def _crowds(path: Path, starts: list[tuple[Points, Mapping[str, Any]]], people: 
     crowds, before, done = [], 0.0, 0
     for k, (points, words) in enumerate(starts):
         crowd: dict[str, Any] = {"name": str(words.get("name") or f"people {k + 1}"), "area": points}
-        if "count" in words:
-            crowd["count"] = int(float(words["count"]))
-        elif "density" in words:
-            crowd["density"] = float(words["density"])
+        told = next((word for word in ("count", "density") if word in words), None)
+        if told is not None:
+            try:
+                number = _number(words[told])
+            except ValueError as error:
+                raise SceneError(f"{path}: {crowd['name']}: {told}: {error}") from None
+            crowd[told] = int(number) if told == "count" else number
         else:
             # Rounded so that all together are as many as were asked for.
             before += _area(points)
@@ -116,31 +119,40 @@ def _geojson(text: str) -> Found:
     if not isinstance(features, list):
         raise ValueError("no list of features, expected a FeatureCollection")
     for k, feature in enumerate(features):
-        words = feature.get("properties") or {} if isinstance(feature, dict) else {}
-        geometry = feature.get("geometry") or {} if isinstance(feature, dict) else {}
-        kind = words.get("kind")
-        if kind not in KINDS:
+        words = feature.get("properties") if isinstance(feature, dict) else None
+        if not isinstance(words, dict) or words.get("kind") not in KINDS:
             continue
-        many = {"LineString": lambda c: [c], "MultiLineString": lambda c: c, "Polygon": lambda c: c}.get(
-            geometry.get("type")
-        )
-        if many is None:
-            raise ValueError(
-                f"features[{k}]: a {geometry.get('type')}, expected a LineString, MultiLineString or Polygon"
-            )
-        for line in many(geometry.get("coordinates") or []):
-            points = [[_number(x) for x in point[:2]] for point in line]
-            if kind == "start":
+        geometry = feature.get("geometry")
+        form = geometry.get("type") if isinstance(geometry, dict) else None
+        if form not in ("LineString", "MultiLineString", "Polygon"):
+            raise ValueError(f"features[{k}]: a {form}, expected a LineString, MultiLineString or Polygon")
+        lines = geometry.get("coordinates")
+        if form == "LineString":
+            lines = [lines]
+        if not isinstance(lines, list):
+            raise ValueError(f"features[{k}]: coordinates are no list of lines")
+        for line in lines:
+            points = _points(line, f"features[{k}]")
+            if words["kind"] == "start":
                 # Its outer ring, which ends where it begins.
-                yield kind, points[:-1] if points[:1] == points[-1:] else points, words
+                yield "start", points[:-1] if points[:1] == points[-1:] else points, words
                 break
-            yield kind, points, words
+            yield words["kind"], points, words
+
+
+def _points(line: Any, place: str) -> Points:
+    if not isinstance(line, list) or not all(isinstance(point, list) and len(point) >= 2 for point in line):
+        raise ValueError(f"{place}: coordinates are no list of points")
+    return [[_number(x) for x in point[:2]] for point in line]
 
 
 def _number(x: Any) -> float:
-    found = float(x)
+    try:
+        found = float(x)
+    except (TypeError, ValueError):
+        found = math.nan
     if not math.isfinite(found):
-        raise ValueError(f"{x!r} is no coordinate")
+        raise ValueError(f"{x!r} is no number")
     return found
 
 

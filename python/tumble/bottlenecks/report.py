@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tumble.bottlenecks.study import CELL, Findings, Rank, ends, gates
+from tumble.bottlenecks.runs import CELL, Findings, Rank, ends, gates
 from tumble.folder import write_whole
 from tumble.lab.page import Section, document, table
 from tumble.style import FAINT, INK, PALETTE, RC
@@ -165,7 +165,8 @@ def _page(found: Findings) -> str:
     people = found.outcomes[0].people
     worst = found.rows[0]
     points = [
-        f"<b>{escape(worst.gate)}</b> costs the most: {number(worst.lost, 0)} person-seconds, {100 * worst.share:.0f} % of all time lost",
+        f"<b>{escape(worst.gate)}</b> costs the most: {number(worst.lost, 0)} person-seconds, "
+        f"{100 * worst.share:.0f} % of all time lost",
         f"last person out after {number(found.last_out, 1)} s; {number(found.lost, 0)} person-seconds lost in all",
     ]
     points += [f"made {w.by:g} m wider, {escape(w.gate)} would save {number(w.saved, 0)} person-seconds, and the last "
@@ -185,9 +186,10 @@ def _page(found: Findings) -> str:
         sections.append(Section(title, ""))
         drawn.append(f'<img src="{name}" alt="{escape(title)}" style="max-width:1000px">')
     notes = [
-        "Time lost is the time of a way less that of walking it freely at the desired speed. It is charged to the next gate on the "
-        "way, or to one beyond it whose queue reaches back through it.",
-        "Who walks at less than half the desired speed waits. Densities are of people within 1 m of a gate, over the floor there.",
+        "Time lost is the time of a way less that of walking it freely at the desired speed. It is charged to the next gate on "
+        "the way, or to one beyond it whose queue reaches back through it.",
+        "Who walks at less than half the desired speed waits. Densities are of people within 1 m of a gate, over the floor "
+        "there.",
     ]
     lead = f"{people} people, seeds {seeds[0]} to {seeds[-1]}."
     title = f"Bottlenecks: {found.title or found.plan['name']}"

@@ -2,12 +2,15 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tumble.cli import find
 from tumble.cli.console import say
+
+if TYPE_CHECKING:
+    from tumble.bottlenecks import Findings
 
 
 def bottlenecks(
@@ -102,11 +105,9 @@ def _told(done: int, total: int) -> None:
         print(f"\r{done} of {total} runs", end="\n" if done == total else "", file=sys.stderr, flush=True)
 
 
-def _say(found: "object", files: list[Path]) -> None:
+def _say(found: "Findings", files: list[Path]) -> None:
     from tumble.bottlenecks.report import HEAD, cells, number
-    from tumble.bottlenecks.study import Findings
 
-    assert isinstance(found, Findings)
     rows = [list(HEAD), *(cells(row) for row in found.rows)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
     for k, row in enumerate(rows):
@@ -117,9 +118,8 @@ def _say(found: "object", files: list[Path]) -> None:
         say(f"{k if k else '':>4}  " + "  ".join(text).rstrip())
     say(f"last person out after {number(found.last_out, 1)} s, {number(found.lost, 0)} person-seconds lost")
     for w in found.widened:
-        say(
-            f"{w.gate} wider by {w.by:g} m: {number(w.saved, 0)} person-seconds saved, last out {number(w.earlier, 1)} s earlier"
-        )
+        gain = f"{number(w.saved, 0)} person-seconds saved, last out {number(w.earlier, 1)} s earlier"
+        say(f"{w.gate} wider by {w.by:g} m: {gain}")
     for seed in found.stuck:
         say(f"seed {seed}: not all left in time")
     for file in files:

@@ -325,6 +325,7 @@ fn populate(thing: &Crowd, crowd: u32, floor: &Floor, seed: u32, people: &mut Ve
             speed,
             starts: thing.reaction + thing.reaction_spread * random.uniform(i as u64, 0, REACTION)[0],
             started: false,
+            out: None,
             id: people.len() as u32,
             crowd,
         });

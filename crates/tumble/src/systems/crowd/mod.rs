@@ -29,6 +29,10 @@ use tumble_interface::{Column, StepError};
 /// Longest step, unless given [s].
 pub const STEP: f64 = 0.05;
 
+/// How far people go on beyond an exit, in the way of who follows [m], and for how long at most [s].
+const BEYOND: f64 = 1.0;
+const PATIENCE: f64 = 3.0;
+
 /// How far anybody goes in a step, at most [m].
 const FAR: f64 = 0.5;
 
@@ -56,7 +60,7 @@ pub struct Crowd {
     floor: Floor,
     /// Everybody who was there at the start, by number.
     all: Vec<Person>,
-    /// Who is there, in the order of numbers.
+    /// Who is there, and who has just left, in the order of numbers.
     people: Vec<Person>,
     /// Time lost by all so far [s].
     lost: f64,
@@ -82,14 +86,21 @@ impl Crowd {
         let queues = self.tally.queues(&self.floor, &self.people, moves.iter().map(|to| to.gate), h);
         let (mut shares, mut gone) = (Vec::with_capacity(moves.len()), Vec::new());
         for ((p, to), (x, phi)) in self.people.iter_mut().zip(moves).zip(&self.before) {
+            if p.out.is_some() {
+                p.phi = to.phi;
+                if p.phi < -BEYOND || t - p.starts > PATIENCE {
+                    gone.push(p.id);
+                }
+                continue;
+            }
             let out = self.tally.cross(&self.floor, &self.settings.exits[p.crowd as usize], *x, p.x, t, h);
             let (took, left) = out.map_or((h, to.phi), |(_, s)| (s * h, 0.0));
             p.phi = left;
             if p.started {
                 shares.push(Share { gate: to.gate, lost: took - (phi - left) / p.speed, waited: if p.waits() { took } else { 0.0 } });
             }
-            if out.is_some() {
-                gone.push(p.id);
+            if let Some((out, _)) = out {
+                (p.out, p.starts) = (Some(out), t);
             }
         }
         self.lost += shares.iter().map(|share| share.lost).sum::<f64>();
@@ -101,7 +112,12 @@ impl Crowd {
 
     /// Rows of a crowd.
     fn of(&self, crowd: usize) -> impl Iterator<Item = &Person> {
-        self.people.iter().filter(move |p| p.crowd as usize == crowd)
+        self.present().filter(move |p| p.crowd as usize == crowd)
+    }
+
+    /// Who has not left.
+    fn present(&self) -> impl Iterator<Item = &Person> {
+        self.people.iter().filter(|p| p.out.is_none())
     }
 
     /// The deepest overlap of two bodies, or of a body and a wall [m].
@@ -193,8 +209,8 @@ impl System for Crowd {
             time: t,
             speed: Some(speed),
             penetration: Some(self.deepest()),
-            people: Some(self.people.len() as u64),
-            left: Some((self.all.len() - self.people.len()) as u64),
+            people: Some(self.present().count() as u64),
+            left: Some((self.all.len() - self.present().count()) as u64),
             lost: Some(self.lost),
             ..Ledger::default()
         }
@@ -213,7 +229,10 @@ impl System for Crowd {
 
     fn save(&self, archive: &mut Archive) {
         archive.push_indices("people", &self.people.iter().map(|p| p.id).collect());
-        let rows = self.people.iter().flat_map(|p| [p.x[0], p.x[1], p.v[0], p.v[1], p.heading, p.phi]);
+        let rows = self.people.iter().flat_map(|p| {
+            let out = p.out.unwrap_or([f64::NAN; 2]);
+            [p.x[0], p.x[1], p.v[0], p.v[1], p.heading, p.phi, p.starts, out[0], out[1]]
+        });
         archive.push("rows", Part::Numbers(rows.collect()));
         archive.push_indices("crossed", &self.tally.crossed.concat());
         let tally = [&self.tally.span.concat()[..], &self.tally.waited, &self.tally.lost, &self.tally.pace, &[self.lost]].concat();
@@ -224,15 +243,16 @@ impl System for Crowd {
         let (ids, rows) = (archive.indices("people")?, archive.numbers("rows")?);
         let (crossed, tally) = (archive.indices("crossed")?, archive.numbers("tally")?);
         let gates = self.floor.plan.gates.len();
-        let fits = rows.len() == 6 * ids.len() && crossed.len() == 2 * gates && tally.len() == 5 * gates + 1;
+        let fits = rows.len() == 9 * ids.len() && crossed.len() == 2 * gates && tally.len() == 5 * gates + 1;
         if !fits || !ids.is_sorted_by(|a, b| a < b) || ids.last().is_some_and(|id| *id as usize >= self.all.len()) {
             return None;
         }
         let person = |(id, row): (&u32, &[f64])| {
             let of = &self.all[*id as usize];
-            Person { x: [row[0], row[1]], v: [row[2], row[3]], heading: row[4], phi: row[5], ..*of }
+            let out = row[7].is_finite().then_some([row[7], row[8]]);
+            Person { x: [row[0], row[1]], v: [row[2], row[3]], heading: row[4], phi: row[5], starts: row[6], out, ..*of }
         };
-        self.people = ids.iter().zip(rows.chunks_exact(6)).map(person).collect();
+        self.people = ids.iter().zip(rows.chunks_exact(9)).map(person).collect();
         self.tally.crossed = crossed.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
         let (span, rest) = tally.split_at(2 * gates);
         self.tally.span = span.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
@@ -246,7 +266,8 @@ impl System for Crowd {
     /// Positions where bodies fit and from which there is a way.
     fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
         let crowd = self.settings.crowds.iter().position(|name| name == object)?;
-        let rows: Vec<usize> = (0..self.people.len()).filter(|i| self.people[*i].crowd as usize == crowd).collect();
+        let rows: Vec<usize> =
+            (0..self.people.len()).filter(|i| self.people[*i].crowd as usize == crowd && self.people[*i].out.is_none()).collect();
         if column != "position" || values.len() != 3 * rows.len() {
             return Some(false);
         }

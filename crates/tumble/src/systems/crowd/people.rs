@@ -5,7 +5,7 @@
 
 use super::near::Near;
 use super::plan::{Plan, Point, along, cross, dot, length, nearest, sub};
-use super::way::{Floor, Way};
+use super::way::{Floor, NONE, Way};
 use crate::math::functions::{atan2, cos, exp, sin};
 use crate::math::parallel::Tasks;
 
@@ -24,8 +24,10 @@ pub struct Person {
     pub radius: f64,
     /// Desired speed [m/s].
     pub speed: f64,
-    /// When it starts [s].
+    /// When it starts [s], or has left.
     pub starts: f64,
+    /// Where it goes once it has left: straight on, a unit vector.
+    pub out: Option<Point>,
     /// Whether it has.
     pub started: bool,
     /// Number, which it keeps.
@@ -53,11 +55,11 @@ pub struct Model {
     pub buffer: f64,
 }
 
-// Of the third version, by its documentation.
+// Of the third version, by its documentation, but for the largest turn, which is chosen so that doors have the measured flow.
 /// Decay of who matters, ahead and aside [m].
 const DECAY: Point = [2.0, 0.8];
 /// Largest turn [rad].
-const TURN: f64 = 1.57;
+const TURN: f64 = 1.0;
 /// Time in which a heading relaxes [s].
 const RELAX: f64 = 0.3;
 /// Offset that smooths the choice of a side [m].
@@ -229,7 +231,7 @@ impl Around<'_> {
 
 /// One step of everybody, from t to t + h [s]. Distances left are not updated.
 pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut Scratch, t: f64, h: f64) {
-    people.iter_mut().for_each(|p| p.started = t >= p.starts);
+    people.iter_mut().for_each(|p| p.started = t >= p.starts || p.out.is_some());
     let most = |f: fn(&Person) -> f64| people.iter().map(f).fold(0.0, f64::max);
     let range = reach(most(|p| p.speed), most(|p| p.radius), model);
     let Scratch { near, sorted, moves } = scratch;
@@ -256,7 +258,10 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut S
             others.extend(neighbours);
             let around = Around { me, plan: &floor.plan, walls: floor.plan.near(me.x), others: &others };
             let (u, heading) = if me.started { one(&around, way, model, h) } else { ([0.0; 2], me.heading) };
-            *to = Move { u, heading, phi: way.distance(along(me.x, 1.0, u)), gate: way.gate(me.x) };
+            *to = match me.out {
+                Some(out) => Move { u, heading, phi: me.phi - dot(u, out), gate: NONE },
+                None => Move { u, heading, phi: way.distance(along(me.x, 1.0, u)), gate: way.gate(me.x) },
+            };
         }
     });
     people.iter_mut().zip(moves.iter()).for_each(|(p, to)| {
@@ -270,7 +275,7 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut S
 fn one(around: &Around<'_>, way: &Way, model: &Model, h: f64) -> (Point, f64) {
     let me = around.me;
     let now = [cos(me.heading), sin(me.heading)];
-    let down = way.direction(me.x);
+    let down = me.out.unwrap_or_else(|| way.direction(me.x));
     let wanted = if down == [0.0; 2] { now } else { down };
     let reference = around.reference(wanted);
     let target = atan2(reference[1], reference[0]) + around.turn(reference);

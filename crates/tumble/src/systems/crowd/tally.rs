@@ -4,7 +4,7 @@
 //! It is charged to the next gate on the way, unless people beyond that gate stand, too: then the queue is that of theirs.
 
 use super::people::Person;
-use super::plan::{Point, crossing, length};
+use super::plan::{Point, crossing, length, sub};
 use super::way::{Floor, NEAR, NONE, in_sight};
 
 /// Mean speed of people beyond a gate over their desired ones, below which its queue is that of the next gate.
@@ -49,8 +49,8 @@ impl Tally {
         }
     }
 
-    /// Counts the gates that a step of h [s] from t crosses, and says which exit ends it, and at which part of the step.
-    pub fn cross(&mut self, floor: &Floor, exits: &[usize], before: Point, after: Point, t: f64, h: f64) -> Option<(usize, f64)> {
+    /// Counts the gates that a step of h [s] from t crosses, and says which way out ends it, a unit vector, and at which part of the step.
+    pub fn cross(&mut self, floor: &Floor, exits: &[usize], before: Point, after: Point, t: f64, h: f64) -> Option<(Point, f64)> {
         let mut met: Vec<(f64, usize, bool)> = Vec::new();
         for &g in floor.plan.gates_near(after) {
             let found = crossing(floor.plan.gates[g as usize].line, before, after);
@@ -62,7 +62,10 @@ impl Tally {
             let at = t + s * h;
             self.span[g] = [if self.span[g][0].is_nan() { at } else { self.span[g][0] }, at];
             if exits.contains(&g) {
-                return Some((g, s));
+                let [a, b] = floor.plan.gates[g].line;
+                let d = sub(b, a);
+                let side = if to_right { 1.0 } else { -1.0 } / length(d);
+                return Some(([side * d[1], -side * d[0]], s));
             }
         }
         None
@@ -122,7 +125,7 @@ impl Tally {
 /// People on the floor near each gate, over its area, on the side where there are more [1/m²].
 pub fn densities(floor: &Floor, people: &[Person]) -> Vec<f64> {
     let mut count = vec![[0.0; 2]; floor.plan.gates.len()];
-    for p in people {
+    for p in people.iter().filter(|p| p.out.is_none()) {
         for &g in floor.plan.gates_near(p.x) {
             if let Some(side) = in_sight(&floor.plan, &floor.plan.gates[g as usize], p.x, NEAR) {
                 count[g as usize][side] += 1.0;
