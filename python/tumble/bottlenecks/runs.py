@@ -210,7 +210,7 @@ def _run(tree: Mapping[str, Any], folder: str, limit: float) -> Outcome:
     shape = (ny, nx)
     seconds, waiting = np.zeros(nx * ny), np.zeros(nx * ny)
     times, present, counts, densities = [], [], [], []
-    people = int(world.ledger.people or 0)
+    people = int(world.ledger["people"] or 0)
     previous = 0.0
     while True:
         columns, time = world.columns("position", "velocity"), world.time
@@ -223,7 +223,7 @@ def _run(tree: Mapping[str, Any], folder: str, limit: float) -> Outcome:
             slow = np.hypot(v[:, 0], v[:, 1]) < WAITS * desired
             waiting += (time - previous) * np.bincount(cell[slow], minlength=nx * ny)
         previous = time
-        here = int(world.ledger.people or 0)
+        here = int(world.ledger["people"] or 0)
         times.append(time)
         present.append(here)
         counts.append(own["crossings"].sum(axis=1))
@@ -243,9 +243,9 @@ def _run(tree: Mapping[str, Any], folder: str, limit: float) -> Outcome:
         int(tree["seed"]),
         tuple(passages),
         last,
-        int(ledger.left or 0),
+        int(ledger["left"] or 0),
         people,
-        float(ledger.lost or 0.0),
+        float(ledger["lost"] or 0.0),
         np.array(times),
         np.array(present, float),
         (seconds / area).reshape(shape),
