@@ -100,7 +100,7 @@ fn people_start_when_they_react() {
         step(&mut sim);
         for (k, started) in started.iter_mut().enumerate() {
             let v = velocities(&sim, &format!("p{k}"));
-            if v.first().is_some_and(|v| v.length() > 0.0) && started.is_none() {
+            if v.first().is_some_and(|v| v.norm() > 0.0) && started.is_none() {
                 *started = Some(sim.time());
             }
         }
@@ -114,7 +114,8 @@ fn people_start_when_they_react() {
 #[test]
 fn a_file_behind_a_slow_leader_has_the_spacing_of_its_speed_as_measured() {
     // Speeds [m/s] measured in single file at these densities [1/m], with their deviations.
-    let measured = [(0.9, 0.85, 0.13), (1.1, 0.58, 0.15), (1.3, 0.41, 0.09), (1.5, 0.29, 0.09), (1.7, 0.22, 0.04), (1.9, 0.14, 0.04)];
+    let measured: [(f64, f64, f64); 6] =
+        [(0.9, 0.85, 0.13), (1.1, 0.58, 0.15), (1.3, 0.41, 0.09), (1.5, 0.29, 0.09), (1.7, 0.22, 0.04), (1.9, 0.14, 0.04)];
     for (density, mean, deviation) in measured {
         // (crowds.4): a spacing of two radii, the buffer, and the way of a time gap.
         let v = (1.0 / density - 0.4) / 0.65;
@@ -316,7 +317,7 @@ fn seeds_change_who_stands_where_and_how_fast_people_are() {
         let mut sim = scene(&format!("seed = {seed}\n{}", bottleneck(1.2, "area = [[0, 0], [8, 8]]\ncount = 200")));
         let x = positions(&sim, "people")[0].x;
         run(&mut sim, 3);
-        let v: Vec<f64> = velocities(&sim, "people").iter().map(|v| v.length()).collect();
+        let v: Vec<f64> = velocities(&sim, "people").iter().map(|v| v.norm()).collect();
         (x, v)
     };
     assert_ne!(of(1).0, of(2).0);
@@ -328,7 +329,7 @@ fn seeds_change_who_stands_where_and_how_fast_people_are() {
     );
     let mut sim = scene(&(words + &crowd("area = [[1, 1], [60, 79]]\ncount = 300")));
     run(&mut sim, 1);
-    let v: Vec<f64> = velocities(&sim, "people").iter().map(|v| v.length()).collect();
+    let v: Vec<f64> = velocities(&sim, "people").iter().map(|v| v.norm()).collect();
     let mean = v.iter().sum::<f64>() / 300.0;
     let deviation = (v.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 300.0).sqrt();
     // Cut at two deviations, a normal distribution keeps 0.96 of its own here; three standard errors.
