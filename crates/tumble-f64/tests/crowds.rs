@@ -40,7 +40,7 @@ fn people(sim: &Simulation) -> u64 {
 
 /// Runs until all have left; how many they were over time, in person-seconds.
 fn empty(sim: &mut Simulation, seconds: f64, mut each: impl FnMut(&Simulation)) -> f64 {
-    let born = people(sim);
+    let born = people(sim) + sim.ledger().left.unwrap();
     let mut time = 0.0;
     while people(sim) > 0 {
         assert!(sim.time() < seconds, "{} of {born} are still there at {} s", people(sim), sim.time());
