@@ -140,6 +140,16 @@ def test_every_column_is_described() -> None:
         {"body": [{"name": "box", "shape": {"box": {"size": [1, 1, 1]}}}]},
         {"heat": [hot]},
         {"compressible": [GAS | {"sound_speed": 300.0, "density": 1.0}]},
+        {
+            "plan": [
+                {
+                    "name": "hall",
+                    "walls": [[[0, 0], [4, 0]], [[0, 2], [4, 2]]],
+                    "exit": [{"name": "out", "from": [4, 0], "to": [4, 2]}],
+                }
+            ],
+            "crowd": [{"name": "people", "position": [[1, 1]]}],
+        },
     ]
     found: dict[str, set[str]] = {"static": set(), "frames": set()}
     for words in scenes:

@@ -51,8 +51,8 @@ __all__ = [
 ]
 
 _MODULES = (
-    "branch", "columns", "compare", "emitters", "expect", "export", "fields", "film", "looks", "measures", "pictures", "plots",
-    "reader", "refine", "run", "slices", "sweeps", "usd",
+    "bottlenecks", "branch", "columns", "compare", "emitters", "expect", "export", "fields", "film", "looks", "measures",
+    "pictures", "plots", "reader", "refine", "run", "slices", "sweeps", "usd",
 )  # fmt: skip
 """Modules for users."""
 

@@ -64,6 +64,12 @@ class Ledger(TypedDict):
     """Heat that has come in through surfaces and from sources [J]."""
     volume: float | None
     """Volume inside closed surfaces of soft objects [m³]."""
+    people: int | None
+    """People on the floor."""
+    left: int | None
+    """People who have left by exits so far."""
+    lost: float | None
+    """Time that people have lost so far against walking freely, all together [s]."""
     divergence: float | None
     """Largest divergence of a gas's velocity in a cell [1/s]."""
 

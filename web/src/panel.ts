@@ -69,6 +69,7 @@ function inForce(key: string, system: Tree): boolean {
     vicsek: method === "vicsek",
     rigid: method === "rigid",
     grains: method === "grains",
+    crowd: method === "crowd",
   };
   return rules[key] ?? true;
 }

@@ -41,6 +41,7 @@ const ROWS: Record<string, string> = {
   drape: "Draped sheets",
   rigid: "Rigid bodies",
   grains: "Sand and grains",
+  crowd: "Crowds",
   coupled: "Everything with everything",
   springs: "Springs",
   structures: "Structures",

@@ -14,6 +14,7 @@ mod bodies;
 mod compressible;
 mod conservation;
 mod coupling;
+mod crowds;
 mod damping;
 mod densities;
 mod electrostatics;

@@ -16,6 +16,8 @@ pub enum Place {
     Triangle,
     /// A frame: the material axes of a piece of a rod.
     Frame,
+    /// A gate of a plan: its doors, then its exits.
+    Gate,
     /// A cell of a grid.
     Cell,
     /// A face between two cells.
@@ -51,6 +53,7 @@ const VECTOR: Described = Described { width: 3, ..ASKED };
 const CELLS: Described = Described { places: &[Place::Cell], ..ASKED };
 const ALWAYS: Described = Described { asked: false, signed: false, ..ASKED };
 const STATIC: Described = Described { in_frames: false, ..ALWAYS };
+const GATES: Described = Described { places: &[Place::Gate], ..ALWAYS };
 const GRID: Described = Described { places: &[Place::Object], ..STATIC };
 
 /// All of them.
@@ -106,6 +109,27 @@ pub const COLUMNS: &[Described] = &[
     Described { name: "id", doc: "Number of an emitted particle, which it keeps.", ..ALWAYS },
     Described { name: "age", unit: "s", doc: "Time since its birth.", ..ALWAYS },
     Described { name: "color", doc: "Red, green and blue.", width: 3, ..ALWAYS },
+    Described { name: "crossings", doc: "Who has crossed a gate so far: from its left to its right, and back.", width: 2, ..GATES },
+    Described { name: "crossing_times", unit: "s", doc: "When a gate was crossed first and last; nan before.", width: 2, ..GATES },
+    Described {
+        name: "gate_density",
+        unit: "1/m²",
+        doc: "People within 1 m of a gate and in sight of it, over the floor there, on the side where there are more.",
+        ..GATES
+    },
+    Described {
+        name: "gate_waiting",
+        unit: "s",
+        doc: "Time at less than half the desired speed, of all people together, in the queue of a gate so far.",
+        ..GATES
+    },
+    Described {
+        name: "gate_lost",
+        unit: "s",
+        doc: "Time lost against walking freely, of all people together, in the queue of a gate so far.",
+        signed: true,
+        ..GATES
+    },
     Described {
         name: "translation",
         unit: "m",

@@ -56,6 +56,12 @@ pub const KINDS: &[Kind] = &[
     Kind { name: "body", doc: "Rigid bodies of one shape.", ..LOOSE },
     Kind { name: "joint", doc: "What holds rigid bodies together: it consists of its ends, first that of the first body.", ..LOOSE },
     Kind { name: "grains", doc: "Spheres of a granular material.", amounts: &["fill"], ..LOOSE },
+    Kind {
+        name: "plan",
+        doc: "The plan of a floor: it consists of the ends of its walls, then of those of its doors and exits.",
+        ..MASSES
+    },
+    Kind { name: "crowd", doc: "People on a floor.", amounts: &["count", "density"], ..LOOSE },
     Kind { name: "heat", doc: "A body that conducts heat.", ..CELLS },
     Kind { name: "compressible", doc: "A gas in which sound travels.", ..CELLS },
     Kind { name: "gas", doc: "An incompressible fluid in a box.", ..CELLS },

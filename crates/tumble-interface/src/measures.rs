@@ -313,6 +313,12 @@ measures! {
         heat_in: Option<f64> = Measure { unit: "J", signed: true, columns: &["heat_in"], ..STATE };
         /// Volume inside closed surfaces of soft objects.
         volume: Option<f64> = Measure { unit: "m³", signed: true, columns: &["volume"], ..STATE };
+        /// People on the floor.
+        people: Option<u64> = Measure { columns: &["people"], ..STATE };
+        /// People who have left by exits so far.
+        left: Option<u64> = Measure { columns: &["left"], ..STATE };
+        /// Time that people have lost so far against walking freely, all together.
+        lost: Option<f64> = Measure { unit: "s", signed: true, columns: &["lost"], ..STATE };
         /// Largest divergence of a gas's velocity in a cell.
         divergence: Option<f64> = Measure { unit: "1/s", about: About::Cell, columns: &["divergence"], ..PEAK };
     } beside {
@@ -408,6 +414,7 @@ pub const BOUNDS: &[Bound] = &[
     Bound { name: "max_volume_error", measure: "volume", how: How::Error },
     Bound { name: "max_divergence", measure: "divergence", how: How::Value },
     Bound { name: "max_heat_error", measure: "heat", how: How::Balance },
+    Bound { name: "people", measure: "people", how: How::Exact },
     Bound { name: "broken_links", measure: "broken", how: How::Exact },
 ];
 

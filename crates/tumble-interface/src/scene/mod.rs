@@ -4,6 +4,7 @@
 mod animated;
 mod cloth;
 mod compressible;
+mod crowd;
 mod emitters;
 mod fabrics;
 mod forces;
@@ -26,6 +27,7 @@ mod vicsek;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use cloth::{Cloth, Dress, Panel, Seam, Side};
 pub use compressible::Compressible;
+pub use crowd::{Crowd, Gate, Plan, Walking};
 pub use emitters::{Between, Burst, Cause, Emit, Emitter, Event, Kill, Source, WhenFull};
 pub use fabrics::{FabricRef, FabricUse, FabricWords};
 pub use forces::{Anchor, Field, Force, Goal};
@@ -126,6 +128,12 @@ pub struct Scene {
     /// Grains, moved by systems of method `grains`.
     #[serde(default)]
     pub grains: Vec<Grains>,
+    /// Plans of floors for crowds.
+    #[serde(default)]
+    pub plan: Vec<Plan>,
+    /// People, moved by systems of method `crowd`.
+    #[serde(default)]
+    pub crowd: Vec<Crowd>,
     /// Bodies that conduct heat.
     #[serde(default)]
     pub heat: Vec<Heat>,

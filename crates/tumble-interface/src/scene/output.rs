@@ -124,6 +124,8 @@ pub struct Expect {
     pub max_heat_error: Option<f64>,
     /// Number of broken links at the last frame.
     pub broken_links: Option<u32>,
+    /// Number of people on the floor at the last frame: 0 if all must have left.
+    pub people: Option<u32>,
     /// Values of single masses at the last frame.
     pub probe: Vec<Probe>,
 }

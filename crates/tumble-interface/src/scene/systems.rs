@@ -1,5 +1,6 @@
 //! Numerical methods and their settings.
 
+use super::crowd::Walking;
 use super::grains::Granular;
 use super::rigid::Rigid;
 use super::vicsek::Vicsek;
@@ -51,6 +52,9 @@ pub struct System {
     /// Settings of the `grains` method.
     #[serde(default)]
     pub grains: Option<Granular>,
+    /// Settings of the `crowd` method.
+    #[serde(default)]
+    pub crowd: Option<Walking>,
     /// Parameters of the `vicsek` method, which requires them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
@@ -71,6 +75,7 @@ impl Default for System {
             self_contact: None,
             rigid: None,
             grains: None,
+            crowd: None,
             vicsek: None,
         }
     }
@@ -102,6 +107,8 @@ pub enum Method {
     Rigid,
     /// Grains with contact and friction, `[[grains]]`, in steps that resolve each bounce, and by default are as long as that allows; there is no integrator.
     Grains,
+    /// People who walk on the plan of a floor, `[[plan]]`, to its exits, `[[crowd]]`. Sub-steps of at most 0.05 s unless given; there is no integrator.
+    Crowd,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
 }
@@ -118,6 +125,7 @@ impl Method {
             Self::Compressible => "compressible",
             Self::Rigid => "rigid",
             Self::Grains => "grains",
+            Self::Crowd => "crowd",
             Self::Gas => "gas",
         }
     }

@@ -1,6 +1,7 @@
 //! L5: the numerical methods. None imports another.
 
 pub mod compressible;
+pub mod crowd;
 pub mod dynamics;
 pub mod gas;
 pub mod grains;

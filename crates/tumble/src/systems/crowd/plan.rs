@@ -1,0 +1,174 @@
+//! The plan of a floor: walls without thickness and gates across openings, with a list of the walls near every place.
+
+/// A place on the floor, or a direction.
+pub type Point = [f64; 2];
+
+pub(super) fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+pub(super) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+/// b to the left of a is positive.
+pub(super) fn cross(a: Point, b: Point) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+pub(super) fn along(x: Point, s: f64, e: Point) -> Point {
+    [x[0] + s * e[0], x[1] + s * e[1]]
+}
+
+pub(super) fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// A line from one place to another.
+pub type Line = [Point; 2];
+
+/// The place on a line that is nearest to x.
+pub fn nearest([a, b]: Line, x: Point) -> Point {
+    let d = sub(b, a);
+    let len_sq = dot(d, d);
+    let s = if len_sq > 0.0 { (dot(sub(x, a), d) / len_sq).clamp(0.0, 1.0) } else { 0.0 };
+    along(a, s, d)
+}
+
+/// Whether the way from x to y meets a line, its ends included.
+pub fn meets([a, b]: Line, x: Point, y: Point) -> bool {
+    let (d, e) = (sub(b, a), sub(y, x));
+    let (sx, sy) = (cross(d, sub(x, a)), cross(d, sub(y, a)));
+    let (sa, sb) = (cross(e, sub(a, x)), cross(e, sub(b, x)));
+    sx * sy <= 0.0 && sa * sb <= 0.0 && (sx != 0.0 || sy != 0.0)
+}
+
+/// Where on the way from x to y, 0 to 1, a line is crossed, and whether from its left to its right. A place on the line itself is to its left, so
+/// that a way of many steps crosses once.
+pub fn crossing([a, b]: Line, x: Point, y: Point) -> Option<(f64, bool)> {
+    let d = sub(b, a);
+    let (sx, sy) = (cross(d, sub(x, a)), cross(d, sub(y, a)));
+    if (sx < 0.0) == (sy < 0.0) {
+        return None;
+    }
+    let s = sx / (sx - sy);
+    let at = dot(sub(along(x, s, sub(y, x)), a), d);
+    (at >= 0.0 && at <= dot(d, d)).then_some((s, sx >= 0.0))
+}
+
+/// A line across an opening, where crossings are counted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gate {
+    /// Its name.
+    pub name: String,
+    /// From jamb to jamb.
+    pub line: Line,
+    /// Whether people leave there.
+    pub exit: bool,
+}
+
+impl Gate {
+    /// Its width [m].
+    pub fn width(&self) -> f64 {
+        length(sub(self.line[1], self.line[0]))
+    }
+}
+
+/// Walls and gates.
+#[derive(Debug, Clone, Default)]
+pub struct Plan {
+    /// Walls.
+    pub walls: Vec<Line>,
+    /// Doors and exits.
+    pub gates: Vec<Gate>,
+    /// The lowest corner of all.
+    pub low: Point,
+    /// The highest.
+    pub high: Point,
+    /// Cells of 1 m along x and y, over the box and all around it as far as lists reach.
+    cells: [usize; 2],
+    origin: Point,
+    /// Walls within reach of any place of a cell.
+    near_walls: Lists,
+    /// Gates within 1 m.
+    near_gates: Lists,
+}
+
+/// A list for each cell.
+#[derive(Debug, Clone, Default)]
+struct Lists {
+    /// Where it begins; one more for the end of the last.
+    starts: Vec<u32>,
+    all: Vec<u32>,
+}
+
+impl Lists {
+    fn of(&self, cell: usize) -> &[u32] {
+        &self.all[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+/// Free space around a plan [m].
+pub const MARGIN: f64 = 1.0;
+
+impl Plan {
+    /// A plan whose lists have all walls within `reach` [m].
+    pub fn new(walls: Vec<Line>, gates: Vec<Gate>, reach: f64) -> Self {
+        let points: Vec<Point> = walls.iter().copied().chain(gates.iter().map(|g| g.line)).flatten().collect();
+        let bound = |a: usize, f: fn(f64, f64) -> f64| points.iter().map(|p| p[a]).reduce(f).unwrap_or(0.0);
+        let (low, high) = ([bound(0, f64::min), bound(1, f64::min)], [bound(0, f64::max), bound(1, f64::max)]);
+        let origin = [low[0] - MARGIN, low[1] - MARGIN];
+        let cells = [0, 1].map(|a| ((high[a] - low[a] + 2.0 * MARGIN).ceil() as usize).max(1));
+        let lists = |lines: &[Line], reach: f64| {
+            let mut lists = Lists { starts: vec![0], all: Vec::new() };
+            for c in 0..cells[0] * cells[1] {
+                let middle = [origin[0] + (c % cells[0]) as f64 + 0.5, origin[1] + (c / cells[0]) as f64 + 0.5];
+                // Half the diagonal of a cell more.
+                let near = |line: &Line| length(sub(nearest(*line, middle), middle)) <= reach + 0.7072;
+                lists.all.extend((0..lines.len() as u32).filter(|i| near(&lines[*i as usize])));
+                lists.starts.push(lists.all.len() as u32);
+            }
+            lists
+        };
+        let near_walls = lists(&walls, reach);
+        let near_gates = lists(&gates.iter().map(|g| g.line).collect::<Vec<_>>(), 1.0);
+        Self { walls, gates, low, high, cells, origin, near_walls, near_gates }
+    }
+
+    fn cell(&self, x: Point) -> usize {
+        let at = |a: usize| (x[a] - self.origin[a]).floor().clamp(0.0, (self.cells[a] - 1) as f64) as usize;
+        at(0) + at(1) * self.cells[0]
+    }
+
+    /// Walls near a place.
+    pub fn near(&self, x: Point) -> &[u32] {
+        self.near_walls.of(self.cell(x))
+    }
+
+    /// Gates within a metre of a place, and some more.
+    pub fn gates_near(&self, x: Point) -> &[u32] {
+        self.near_gates.of(self.cell(x))
+    }
+
+    /// Whether no wall of a list stands between two places.
+    pub fn sees(&self, near: &[u32], x: Point, y: Point) -> bool {
+        near.iter().all(|w| !meets(self.walls[*w as usize], x, y))
+    }
+
+    /// Distance to the nearest wall of those near [m].
+    pub fn clearance(&self, x: Point) -> f64 {
+        self.near(x).iter().map(|w| length(sub(x, nearest(self.walls[*w as usize], x)))).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Whether a place is inside a polygon.
+pub fn inside(polygon: &[Point], x: Point) -> bool {
+    let mut odd = false;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        if (a[1] > x[1]) != (b[1] > x[1]) && x[0] < a[0] + (x[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) {
+            odd = !odd;
+        }
+    }
+    odd
+}
