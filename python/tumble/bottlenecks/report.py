@@ -7,7 +7,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +14,8 @@ from matplotlib.figure import Figure
 from tumble.bottlenecks.runs import CELL, Findings, Rank, ends, gates
 from tumble.folder import write_whole
 from tumble.lab.page import Section, document, table
-from tumble.style import FAINT, INK, PALETTE, RC
+from tumble.plots import settings
+from tumble.style import FAINT, INK, PALETTE
 from tumble.sweeps.statistics import Spread
 
 DOTS = 130.0
@@ -68,7 +68,7 @@ def _map(found: Findings, cells: Any, title: str) -> bytes:
     ny, nx = cells.shape
     x, y = found.origin
     extent = (x, x + nx * CELL, y, y + ny * CELL)
-    with matplotlib.rc_context(RC):
+    with settings():
         height = min(max(WIDE * ny / nx, 2.5), 12.0)
         figure = Figure(figsize=(WIDE, height + 0.6), layout="constrained")
         axes = figure.add_subplot()
@@ -102,7 +102,7 @@ def _walls(axes: Axes, found: Findings) -> None:
 
 def _curves(found: Findings) -> bytes:
     """People on the floor over time, seed by seed, and who has crossed the first gates."""
-    with matplotlib.rc_context(RC):
+    with settings():
         figure = Figure(figsize=(WIDE, 3.2), layout="constrained")
         left, right = figure.subplots(1, 2)
         for run in found.outcomes:
