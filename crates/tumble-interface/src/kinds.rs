@@ -56,6 +56,7 @@ pub const KINDS: &[Kind] = &[
     Kind { name: "body", doc: "Rigid bodies of one shape.", ..LOOSE },
     Kind { name: "joint", doc: "What holds rigid bodies together: it consists of its ends, first that of the first body.", ..LOOSE },
     Kind { name: "grains", doc: "Spheres of a granular material.", amounts: &["fill"], ..LOOSE },
+    Kind { name: "liquid", doc: "A liquid with a free surface: its particles.", resolution: Some("box.resolution"), ..LOOSE },
     Kind { name: "heat", doc: "A body that conducts heat.", ..CELLS },
     Kind { name: "compressible", doc: "A gas in which sound travels.", ..CELLS },
     Kind { name: "gas", doc: "An incompressible fluid in a box.", ..CELLS },

@@ -104,6 +104,8 @@ pub enum Method {
     Grains,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
+    /// Particles in cells: incompressible liquids with a free surface, `[[liquid]]`. There is no integrator.
+    Liquid,
 }
 
 impl Method {
@@ -119,6 +121,7 @@ impl Method {
             Self::Rigid => "rigid",
             Self::Grains => "grains",
             Self::Gas => "gas",
+            Self::Liquid => "liquid",
         }
     }
 }

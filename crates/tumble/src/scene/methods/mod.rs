@@ -5,6 +5,7 @@ mod dynamics;
 mod gas;
 mod grains;
 mod heat;
+mod liquid;
 mod rigid;
 mod tracers;
 mod vicsek;
@@ -23,8 +24,17 @@ use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
 /// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
-pub const METHODS: [&dyn MethodRules; 8] =
-    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &rigid::Rules, &grains::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
+pub const METHODS: [&dyn MethodRules; 9] = [
+    &dynamics::Rules,
+    &tracers::Rules,
+    &vicsek::Rules,
+    &rigid::Rules,
+    &grains::Rules,
+    &gas::Rules,
+    &liquid::Rules,
+    &heat::Rules,
+    &compressible::Rules,
+];
 
 /// Exchanges a second where masses and rigid bodies touch: in one interval a body falls 0.1 mm before what bears it says so.
 const RATE: f64 = 240.0;
