@@ -3,7 +3,8 @@
 //!   y = sum over p of k(|x - x_p|) (x_p - x)/sum of k,   phi = G(|y|)                                                   (pic.4)
 //!
 //! with k(r) = (1 - (r/R)²)³ and G such that phi is the distance from the surface of a half-space that is full of particles. In a full
-//! neighbourhood y is 0: so phi knows nothing of how densely particles lie, and finds no hole between them.
+//! neighbourhood y is 0. It is so in thin sheets, too, and a crowd in one spot looks like a single particle; so the weight of the particles around
+//! bounds phi from both sides.
 //!
 //! Source: [zhu2005], without a radius of its own.
 
@@ -12,6 +13,7 @@ use crate::fluids::Solids;
 use crate::math::Real;
 use crate::math::parallel::Tasks;
 use crate::state::{Field, Grid, GridError, Place};
+use std::f64::consts::PI;
 
 /// Reach of the kernel [cells].
 const REACH: f64 = 1.5;
@@ -34,6 +36,10 @@ pub mod cell {
 const NOTHING: u8 = 1;
 const PARTICLES: u8 = 2;
 const SOLID: u8 = 4;
+/// Fewer particles than for half of it.
+const SPARSE: u8 = 8;
+/// By how much the weight of the particles around may be off before it says more than where they lie.
+const SPREAD: Real = 1.2;
 
 /// The free surface of a liquid.
 pub struct Level {
@@ -48,6 +54,15 @@ pub struct Level {
     around: Vec<u8>,
     /// G at equal distances from 0 to R.
     table: Vec<Real>,
+    /// Distances of half-spaces, by equal parts of the weight of a full neighbourhood that they have.
+    parts: Vec<Real>,
+}
+
+/// What distances are looked up in, and the part of the weight of a full neighbourhood that a particle at its middle has.
+struct Tables<'a> {
+    distance: &'a [Real],
+    parts: &'a [Real],
+    particle: Real,
 }
 
 impl Level {
@@ -61,18 +76,21 @@ impl Level {
             there: vec![0; len],
             around: vec![0; len],
             table: table(grid.dimension()),
+            parts: parts(grid.dimension()),
         })
     }
 
     /// Finds it anew around sorted particles, each of this volume [cells].
     pub fn measure(&mut self, particles: &Particles, particle: f64, solids: Option<&Solids>) {
         let grid = self.distance.grid;
-        self.fill(particles, solids);
-        let Self { distance, cells, there, around, table, .. } = self;
+        self.fill(particles, particle, solids);
+        let full = if grid.dimension() == 3 { REACH.powi(3) * 64.0 * PI / 315.0 } else { REACH * REACH * PI / 4.0 };
+        let Self { distance, cells, there, around, table, parts, .. } = self;
+        let tables = Tables { distance: table, parts, particle: (particle / full) as Real };
         let (lattice, [x, y, z]) = (grid.lattice(), grid.n);
         let plane = lattice.stride[2];
         let first = lattice.at(0, 0, 0) - lattice.stride[1];
-        let (there, table) = (&*there, &*table);
+        let there = &*there;
         let tasks = distance.data[first..].chunks_mut(plane).zip(cells[first..].chunks_mut(plane)).zip(around[first..].chunks_mut(plane));
         let volumes = tasks.take(z).enumerate().map_in_parallel(|(k, ((distance, cells), around))| {
             let mut volume = 0.0;
@@ -84,16 +102,16 @@ impl Level {
                 for i in 0..x {
                     let phi = if around[i] & PARTICLES == 0 {
                         REACH as Real
-                    } else if around[i] & NOTHING == 0 {
+                    } else if around[i] & (NOTHING | SPARSE) == 0 {
                         -REACH as Real
                     } else {
-                        found(&grid, particles, solids, table, [i, j, k])
+                        found(&grid, particles, solids, &tables, [i, j, k])
                     };
                     distance[own + i] = phi;
                     cells[own + i] = if phi < 0.0 { cell::LIQUID } else { cell::AIR };
                     let open = solids.map_or(1.0, |solids| f64::from(share(solids.middle(row + i) / grid.dx as Real)));
                     let part = share(-phi);
-                    // Drops that hold no middle of a cell have the volume of their particles.
+                    // Drops of which nothing counts have the volume of their particles.
                     let number = i + x * (j + y * k);
                     let drops = if part == 0.0 { particles.between(number, number + 1).len() as f64 } else { 0.0 };
                     volume += open * f64::from(part) + drops * particle;
@@ -105,7 +123,7 @@ impl Level {
     }
 
     /// Which cells have particles; those in solids miss none.
-    fn fill(&mut self, particles: &Particles, solids: Option<&Solids>) {
+    fn fill(&mut self, particles: &Particles, particle: f64, solids: Option<&Solids>) {
         let grid = self.distance.grid;
         let (lattice, [x, y, z]) = (grid.lattice(), grid.n);
         let plane = lattice.stride[2];
@@ -117,10 +135,11 @@ impl Level {
                 for (i, there) in there.iter_mut().enumerate() {
                     let number = i + x * (j + y * k);
                     let solid = || solids.is_some_and(|solids| solids.middle(row + i) < 0.5 * grid.dx as Real);
-                    *there = match particles.between(number, number + 1).is_empty() {
-                        false => PARTICLES,
-                        true if solid() => SOLID,
-                        true => NOTHING,
+                    *there = match particles.between(number, number + 1).len() {
+                        0 if solid() => SOLID,
+                        0 => NOTHING,
+                        n if n as f64 * particle < 0.5 => PARTICLES | SPARSE,
+                        _ => PARTICLES,
                     };
                 }
             }
@@ -152,7 +171,7 @@ fn look_around(grid: &Grid, there: &[u8], row: usize, around: &mut [u8]) {
 }
 
 /// The distance of a cell from the surface.
-fn found(grid: &Grid, particles: &Particles, solids: Option<&Solids>, table: &[Real], at: [usize; 3]) -> Real {
+fn found(grid: &Grid, particles: &Particles, solids: Option<&Solids>, tables: &Tables<'_>, at: [usize; 3]) -> Real {
     let middle = at.map(|i| i as Real + 0.5);
     let (mut sum, mut mean) = (0.0, [0.0; 3]);
     let scale = (1.0 / (REACH * REACH)) as Real;
@@ -192,18 +211,59 @@ fn found(grid: &Grid, particles: &Particles, solids: Option<&Solids>, table: &[R
         return REACH as Real;
     }
     let mut mean = mean.map(|m| m / sum);
+    let mut part = sum * tables.particle;
     if let Some(solids) = solids {
         let (distance, normal) = solids.middle_and_normal(grid.lattice().at(at[0], at[1], at[2]));
         let near = BESIDE - distance / grid.dx as Real;
+        part /= 1.0 - part_at(tables.parts, distance / grid.dx as Real);
         let away = mean.iter().zip(normal).map(|(m, n)| m * n).sum::<Real>();
         if near > 0.0 && away > 0.0 {
             let less = near.min(1.0) * away;
             (0..3).for_each(|a| mean[a] -= less * normal[a]);
         }
     }
-    let s = mean.iter().map(|m| m * m).sum::<Real>().sqrt() * (TABLE as f64 / REACH) as Real;
+    let by_mean = read(tables.distance, mean.iter().map(|m| m * m).sum::<Real>().sqrt() / REACH as Real);
+    by_mean.max(read(tables.parts, SPREAD * part)).min(read(tables.parts, part / SPREAD))
+}
+
+/// An entry of a table, at a place from 0 to 1.
+fn read(table: &[Real], at: Real) -> Real {
+    let s = at.clamp(0.0, 1.0) * TABLE as Real;
     let i = (s as usize).min(TABLE - 1);
-    table[i] + (s - i as Real).min(1.0) * (table[i + 1] - table[i])
+    table[i] + (s - i as Real) * (table[i + 1] - table[i])
+}
+
+/// The part of the weight of a neighbourhood that lies behind a plane at this distance [cells].
+fn part_at(parts: &[Real], distance: Real) -> Real {
+    // parts falls.
+    let i = parts.partition_point(|d| *d > distance);
+    if i == 0 { 0.0 } else { (i as Real / TABLE as Real).min(0.95) }
+}
+
+/// Distances of half-spaces, by their part of the weight of a full neighbourhood.
+fn parts(dimension: usize) -> Vec<Real> {
+    const STEPS: usize = 4096;
+    let layer = |z: f64| {
+        let s = (1.0 - z * z).max(0.0);
+        s * s * s * if dimension == 3 { s } else { s.sqrt() }
+    };
+    let width = 2.0 / STEPS as f64;
+    let mut at = vec![(0.0, 1.0)];
+    let mut area = 0.0;
+    for step in 1..=STEPS {
+        let d = 1.0 - step as f64 * width;
+        area += width * (layer(d) + 4.0 * layer(d + 0.5 * width) + layer(d + width)) / 6.0;
+        at.push((area, d));
+    }
+    let mut next = 0;
+    let mut entry = |p: f64| {
+        while next + 2 < at.len() && at[next + 1].0 < p * area {
+            next += 1;
+        }
+        let ((p0, d0), (p1, d1)) = (at[next], at[next + 1]);
+        d0 + ((p * area - p0) / (p1 - p0).max(1e-300)).clamp(0.0, 1.0) * (d1 - d0)
+    };
+    (0..=TABLE).map(|i| (REACH * entry(i as f64 / TABLE as f64)) as Real).collect()
 }
 
 /// G. With d the distance from the surface over R, the layers of a half-space weigh (1 - z²)^(m - 1), and so

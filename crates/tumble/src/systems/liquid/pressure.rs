@@ -17,8 +17,8 @@ use tumble_interface::scene::OnFailure;
 
 /// The least part of the way to the next cell at which a surface may lie.
 const LEAST: Real = 0.01;
-/// Deepest layers whose density counts as that of the surface [cells].
-const SKIN: Real = -1.2;
+/// How much farther inside the particles of a surface lie than those of a lattice whose surface is as far [cells].
+const INSIDE: Real = 0.08;
 /// The largest excess or lack of density that is removed at once.
 const MOST: Real = 0.5;
 /// Residual of the displacement, relative to the density's error.
@@ -149,7 +149,7 @@ impl Matrix {
         Ok(())
     }
 
-    /// Displacements on faces [cells] after which the liquid is nowhere denser than at rest, nor thinner below its surface;
+    /// Displacements on faces [cells] after which the liquid is as dense as at rest;
     /// `density` is relative to that at rest.                                                                    (pic.9)
     pub fn displace(
         &mut self,
@@ -166,9 +166,9 @@ impl Matrix {
         chunks(&mut b, |start, b| {
             for (i, b) in b.iter_mut().enumerate() {
                 let at = start + i;
-                let excess = (density.data[at] - 1.0).clamp(-MOST, MOST);
-                let skin = level.distance.data[at] > SKIN;
-                *b = dx * if skin { excess.max(0.0) } else { excess };
+                // What a cell so far below a plane surface has of the density.
+                let above = (1.0 - INSIDE + level.distance.data[at]).clamp(0.0, 1.0);
+                *b = dx * (density.data[at] - 1.0 + 0.5 * above * above).clamp(-MOST, MOST);
             }
         });
         keep_liquid(&mut b, level);

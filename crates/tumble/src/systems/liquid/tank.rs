@@ -63,7 +63,7 @@ pub struct Tank {
     pub particles: Particles,
     /// Pressure of the last projection at cells [Pa], beside the liquid as it goes on.
     pub pressure: Field,
-    /// The last sub-step [s]; 0 at the start.
+    /// The last step [s]; 0 at the start.
     pub last: f64,
     pub(super) level: Level,
     pub(super) solids: Option<Solids>,
@@ -154,13 +154,21 @@ impl Tank {
     fn settle(&mut self) {
         let open = self.solids.as_ref().map(|solids| &solids.open);
         self.marks = empty(&self.grid, open);
-        self.room = self.solids.as_ref().filter(|_| self.settings.keep_volume).map(|solids| room(&self.grid, solids));
+        self.room = self.solids.as_ref().map(|solids| room(&self.grid, solids));
     }
 
-    /// Sorts its particles and finds its surface; both are functions of where they are.
+    /// Sorts its particles, finds its surface and how densely it lies; all are functions of where they are.
     pub fn prepare(&mut self) {
-        self.particles.sort(self.grid.n);
-        self.level.measure(&self.particles, self.settings.particle, self.solids.as_ref());
+        let Self { particles, level, crowd, room, settings, solids, grid, .. } = self;
+        particles.sort(grid.n);
+        level.measure(particles, settings.particle, solids.as_ref());
+        splat::to_cells(particles, crowd);
+        let scale = settings.particle as Real;
+        chunks(&mut crowd.data, |start, crowd| {
+            for (i, crowd) in crowd.iter_mut().enumerate() {
+                *crowd *= scale / room.as_ref().map_or(1.0, |room| room[start + i]);
+            }
+        });
     }
 
     /// The largest component of the velocity of a particle, and of solids across faces [m/s].
@@ -176,48 +184,44 @@ impl Tank {
     pub fn courant_step(&self, t: f64, left: f64) -> f64 {
         let (way, speed) = (self.settings.courant * self.grid.dx, self.fastest());
         let g = self.settings.gravity.at(t).iter().map(|g| g * g).sum::<f64>().sqrt();
-        // v h + g h² = way
-        let h = if speed > 0.0 || g > 0.0 { 2.0 * way / (speed + (speed * speed + 4.0 * g * way).sqrt()) } else { left };
-        h.min(left)
+        // The second half h with all of its gravity: (v + 2 h g) h = way.
+        let half = if speed > 0.0 || g > 0.0 { 2.0 * way / (speed + (speed * speed + 8.0 * g * way).sqrt()) } else { left };
+        (2.0 * half).min(left)
     }
 
-    /// One step of h seconds from t to `end` [s].
+    /// One step of h seconds from t to `end` [s]: in the first half, without forces, the pressure acts twice.             (pic.7)
     pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Failure> {
-        report.passed(self.fastest() * h / self.grid.dx);
-        // Velocities are those in the middle of steps.                                                          (pic.7)
-        let kick = 0.5 * (self.last + h);
         self.last = h;
+        self.half((t, t + 0.5 * h), h, false, report)?;
+        let first = self.pressure.data.clone();
+        self.half((t + 0.5 * h, end), h, true, report)?;
+        chunks(&mut self.pressure.data, |start, p| p.iter_mut().zip(&first[start..]).for_each(|(p, first)| *p += 2.0 * first));
+        Ok(())
+    }
+
+    /// Half of a step of h seconds between two times [s].
+    fn half(&mut self, (from, to): (f64, f64), h: f64, second: bool, report: &mut StepReport) -> Result<(), Failure> {
+        let half = 0.5 * h;
+        report.passed(self.fastest() * half / self.grid.dx);
         let mut matrix = Matrix::new(&self.level, self.solids.as_ref(), &self.sides, std::mem::take(&mut self.spare))?;
-        self.displacements(&mut matrix, report)?;
+        if self.settings.keep_volume {
+            matrix.displace(&self.crowd, &self.level, self.solids.as_ref(), &mut self.way, report)?;
+        }
         self.to_grid();
-        self.accelerate(t, kick);
+        if second {
+            self.accelerate(from, h);
+        }
         let Self { u, pressure, level, solids, sides, settings, .. } = self;
-        matrix.project(u, pressure, level, (solids.as_ref(), sides), (t + h, kick, settings.density), settings.accuracy, report)?;
+        matrix.project(u, pressure, level, (solids.as_ref(), sides), (to, h, settings.density), settings.accuracy, report)?;
         self.spare = matrix.into_spare();
-        self.reach_out(h);
-        self.to_particles();
+        self.reach_out(half);
+        self.to_particles(second);
         if self.solids.as_ref().is_some_and(Solids::moves) {
-            self.put(end);
+            self.put(to);
         }
         self.push_out();
         self.prepare();
         Ok(())
-    }
-
-    /// Ways that restore the density [cells].                                                                   (pic.9)
-    fn displacements(&mut self, matrix: &mut Matrix, report: &mut StepReport) -> Result<(), Failure> {
-        let Self { particles, level, solids, way, crowd, room, settings, .. } = self;
-        if !settings.keep_volume {
-            return Ok(());
-        }
-        splat::to_cells(particles, crowd);
-        let scale = settings.particle as Real;
-        chunks(&mut crowd.data, |start, crowd| {
-            for (i, crowd) in crowd.iter_mut().enumerate() {
-                *crowd *= scale / room.as_ref().map_or(1.0, |room| room[start + i]);
-            }
-        });
-        matrix.displace(crowd, level, solids.as_ref(), way, report)
     }
 
     /// Velocities of particles to faces.
@@ -299,33 +303,29 @@ impl Tank {
     }
 
     /// Velocities of faces to particles, which then go their way.                                               (pic.2, pic.3)
-    fn to_particles(&mut self) {
-        let Self { particles, u, way, before, solids, settings, grid, .. } = self;
-        let (solids, dx) = (solids.as_ref(), grid.dx as Real);
-        let (velocity, way) = (Sampler::new(u), Sampler::new(way));
-        let before = Sampler::new(before);
+    fn to_particles(&mut self, second: bool) {
+        let Self { particles, u, way, before, settings, grid, .. } = self;
+        let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
         let Particles { x, v, gradient, .. } = particles;
         let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
         let tops = grid.n.map(|n| n as Real - SIDE);
+        // What the pressure has changed counts twice in the first half.
+        let more = if second { 0.0 } else { 1.0 };
         let tasks = x.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)).zip(gradients);
         tasks.in_parallel(|((x, v), mut gradient): ((_, _), Option<&mut [Gradient]>)| {
             for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
-                match (&mut gradient, settings.transfer) {
-                    // What stands for the velocity in solids has no slope to be trusted.
-                    (Some(gradient), _) if solids.is_some_and(|solids| solids.near(x).0 < dx) => {
-                        (*v, gradient[i]) = (velocity.read(x), Gradient::default());
-                    }
-                    (Some(gradient), _) => (*v, gradient[i]) = velocity.with_gradient(x),
-                    (None, Transfer::Flip(ratio)) => {
-                        let (new, old, ratio) = (velocity.read(x), before.read(x), ratio as Real);
-                        *v = std::array::from_fn(|a| new[a] + ratio * (v[a] - old[a]));
-                    }
-                    _ => *v = velocity.read(x),
+                let carried = |new: Real, old: Real| new + more * (new - old);
+                if let Some(gradient) = &mut gradient {
+                    let ((new, slope), (old, before)) = (velocity.with_gradient(x), before.with_gradient(x));
+                    *v = std::array::from_fn(|a| carried(new[a], old[a]));
+                    gradient[i] = std::array::from_fn(|a| std::array::from_fn(|b| carried(slope[a][b], before[a][b])));
+                } else {
+                    let (new, old) = (velocity.read(x), before.read(x));
+                    let ratio = if let Transfer::Flip(ratio) = settings.transfer { ratio as Real } else { 0.0 };
+                    *v = std::array::from_fn(|a| carried(new[a], old[a]) + ratio * (v[a] - old[a]));
                 }
-                // Half of the way with what is at its start, all of it with what is in its middle.
-                let first = way.read(x);
-                let middle = std::array::from_fn(|a| x[a] + 0.5 * first[a]);
-                let all = way.read(&middle);
+                // Straight on: what goes its way with its own velocity keeps its angular momentum.
+                let all = way.read(x);
                 for a in grid.axes() {
                     x[a] = (x[a] + all[a]).max(SIDE).min(tops[a]);
                 }
