@@ -174,7 +174,8 @@ impl Tank {
     /// The largest component of the velocity of a particle, and of solids across faces [m/s].
     pub fn fastest(&self) -> f64 {
         let most = |range: std::ops::Range<usize>| {
-            self.particles.v[range].iter().flatten().fold(0.0, |most: Real, v| if *v == *v { most.max(v.abs()) } else { Real::NAN })
+            let worse = |most: Real, v: &Real| if v.abs() > most || v.is_nan() { v.abs() } else { most };
+            self.particles.v[range].iter().flatten().fold(0.0, worse)
         };
         let particles = fold(self.particles.count(), most).into_iter().fold(0.0, |a: Real, b| if a >= b || a.is_nan() { a } else { b });
         f64::from(particles).max(self.solids.as_ref().map_or(0.0, Solids::fastest_cut))
@@ -207,7 +208,7 @@ impl Tank {
         if self.settings.keep_volume {
             matrix.displace(&self.crowd, &self.level, self.solids.as_ref(), &mut self.way, report)?;
         }
-        self.to_grid();
+        self.give_to_grid();
         if second {
             self.accelerate(from, h);
         }
@@ -215,7 +216,7 @@ impl Tank {
         matrix.project(u, pressure, level, (solids.as_ref(), sides), (to, h, settings.density), settings.accuracy, report)?;
         self.spare = matrix.into_spare();
         self.reach_out(half);
-        self.to_particles(second);
+        self.give_to_particles(second);
         if self.solids.as_ref().is_some_and(Solids::moves) {
             self.put(to);
         }
@@ -225,7 +226,7 @@ impl Tank {
     }
 
     /// Velocities of particles to faces.
-    fn to_grid(&mut self) {
+    fn give_to_grid(&mut self) {
         splat::to_faces(&self.particles, &mut self.u, &mut self.weights);
         self.reached.clone_from(&self.marks);
         know(&mut self.reached, &mut self.weights);
@@ -303,7 +304,7 @@ impl Tank {
     }
 
     /// Velocities of faces to particles, which then go their way.                                               (pic.2, pic.3)
-    fn to_particles(&mut self, second: bool) {
+    fn give_to_particles(&mut self, second: bool) {
         let Self { particles, u, way, before, settings, grid, .. } = self;
         let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
         let Particles { x, v, gradient, .. } = particles;
