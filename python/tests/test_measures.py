@@ -180,5 +180,5 @@ def test_every_kind_is_described() -> None:
         for word in (*kind.amounts, *filter(None, [kind.resolution])):
             assert word.partition(".")[0] in words, (kind.name, word)
         assert kind.surface <= ({"membrane", "fabric"} <= words.keys())
-        assert (kind.matter == "cells") == ("box" in words)
+        assert (kind.resolution == "box.resolution") == ("box" in words) and (kind.matter != "cells" or "box" in words)
     assert GRIDS == ("heat", "compressible", "gas") and "hair" in BOUND and "collider" not in OBJECTS

@@ -47,6 +47,7 @@ BEGINNINGS = {
     "gravity/encounter": 48,
     "gravity/galaxy": 24,
     "heat/finned_plate": 30,
+    "liquid/dam": 6,
     "particles/fountain": 48,
     "particles/pool": 6,
     "particles/snow": 48,

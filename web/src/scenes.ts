@@ -50,6 +50,7 @@ const ROWS: Record<string, string> = {
   particles: "Particles",
   gravity: "Gravity",
   gas: "Gas and smoke",
+  liquid: "Water",
   heat: "Heat",
   failures: "Failures",
 };

@@ -58,6 +58,7 @@ export function topics(info: SceneInfo): Topic[] {
   if ((scene.body ?? []).some((b: any) => b.fracture)) found.push({ page: "fracture", tags: ["fracture.1"] });
   if (has("joint")) found.push({ page: "joints", tags: ["joints.1", "joints.2"] });
   if (has("crowd")) found.push({ page: "crowds", tags: ["crowds.4", "crowds.7"] });
+  if (has("liquid")) found.push({ page: "pic", tags: ["pic.0", "pic.1", "pic.3", "pic.6"] }, { page: "pressure", tags: ["pressure.1"] });
   if (has("grains")) found.push({ page: "grains", tags: ["grains.1", "grains.2"] });
   if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
   for (const force of [...(scene.force ?? []), ...(scene.field ?? [])])

@@ -29,6 +29,7 @@ mod heat;
 mod immersed;
 mod integrators_order;
 mod integrators_oscillator;
+mod liquid;
 mod neighbours;
 mod operators;
 mod pressure;

@@ -89,7 +89,8 @@ pub const COLUMNS: &[Described] = &[
     Described {
         name: "pressure",
         unit: "Pa",
-        doc: "Pressure; of a gas that of the last solve, in a liquid of particles the mean over the last interval.",
+        doc: "Pressure; of a gas, and at the particles of a liquid on a grid, that of the last solve, in a liquid of particles the mean over \
+              the last interval.",
         places: &[Place::Cell, Place::Mass],
         ..CELLS
     },

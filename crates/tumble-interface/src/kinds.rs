@@ -62,6 +62,7 @@ pub const KINDS: &[Kind] = &[
         ..MASSES
     },
     Kind { name: "crowd", doc: "People on a floor.", amounts: &["count", "density"], ..LOOSE },
+    Kind { name: "liquid", doc: "A liquid with a free surface: its particles.", resolution: Some("box.resolution"), ..LOOSE },
     Kind { name: "heat", doc: "A body that conducts heat.", ..CELLS },
     Kind { name: "compressible", doc: "A gas in which sound travels.", ..CELLS },
     Kind { name: "gas", doc: "An incompressible fluid in a box.", ..CELLS },

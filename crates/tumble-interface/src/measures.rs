@@ -311,7 +311,7 @@ measures! {
         heat: Option<f64> = Measure { unit: "J", signed: true, columns: &["heat"], ..STATE };
         /// Heat that has come in through surfaces and from sources.
         heat_in: Option<f64> = Measure { unit: "J", signed: true, columns: &["heat_in"], ..STATE };
-        /// Volume inside closed surfaces of soft objects.
+        /// Volume inside closed surfaces of soft objects, and of liquids on grids, in a plane for a metre across it.
         volume: Option<f64> = Measure { unit: "m³", signed: true, columns: &["volume"], ..STATE };
         /// People on the floor.
         people: Option<u64> = Measure { columns: &["people"], ..STATE };

@@ -284,8 +284,9 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
     for name, table in topology.items():
         if name in born:
             continue
-        grains = any(thing["name"] == name for thing in tree["grains"])
-        own = words | ({"mass": "rigid body"} if "vertices" in table else {"mass": "grain"} if grains else {})
+        loose = (("grains", "grain"), ("liquid", "particle"))
+        word = next((word for kind, word in loose if any(thing["name"] == name for thing in tree[kind])), "mass")
+        own = words | {"mass": "rigid body" if "vertices" in table else word}
         parts = [counted(len(table[key]), word) for key, word in own.items() if key in table]
         if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
             word = "particle" if _is_of(tree, name, "vicsek") else "tracer"

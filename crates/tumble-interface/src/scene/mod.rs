@@ -15,6 +15,7 @@ mod hair;
 mod heat;
 mod joints;
 mod links;
+mod liquid;
 mod objects;
 mod output;
 mod rigid;
@@ -41,6 +42,7 @@ pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use joints::{Joint, JointKind, JointMotor};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
+pub use liquid::{Liquid, LiquidFill, LiquidPressure, LiquidTransfer};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use rigid::{Arrange, BirthRegion, Body, BodyEmit, BodyPart, BodyShape, Fracture, Rigid};
@@ -143,6 +145,9 @@ pub struct Scene {
     /// Fluids that fill a box, moved by systems of method `gas`.
     #[serde(default)]
     pub gas: Vec<Gas>,
+    /// Liquids with a free surface, moved by systems of method `liquid`.
+    #[serde(default)]
+    pub liquid: Vec<Liquid>,
     /// Forces on the masses of `dynamics` systems.
     #[serde(default)]
     pub force: Vec<Force>,

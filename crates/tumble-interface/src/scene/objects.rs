@@ -38,4 +38,4 @@ macro_rules! kinds {
     };
 }
 
-kinds! { particles emitter rope hair sheet block net cloth galaxy body joint grains plan crowd gas heat compressible }
+kinds! { particles emitter rope hair sheet block net cloth galaxy body joint grains plan crowd gas liquid heat compressible }

@@ -111,6 +111,8 @@ pub enum Method {
     Crowd,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
+    /// Particles in cells: incompressible liquids with a free surface, `[[liquid]]`. There is no integrator.
+    Liquid,
 }
 
 impl Method {
@@ -127,6 +129,7 @@ impl Method {
             Self::Grains => "grains",
             Self::Crowd => "crowd",
             Self::Gas => "gas",
+            Self::Liquid => "liquid",
         }
     }
 }

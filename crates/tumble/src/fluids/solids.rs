@@ -638,6 +638,53 @@ impl Solids {
         self.clear(&mut b.data, 0.0);
     }
 
+    /// Distance of the middle of a cell from the nearest surface [m], the mean of those of its corners; far away a lower bound.
+    pub fn middle(&self, cell: usize) -> Real {
+        self.middle_and_normal(cell).0
+    }
+
+    /// The same with the direction away from the surface; far away there is none.
+    pub fn middle_and_normal(&self, cell: usize) -> (Real, [Real; 3]) {
+        self.among_nodes(cell, [0.5; 3])
+    }
+
+    /// The same of a place, in cells from the lowest corner of the box.
+    pub fn near(&self, x: &[Real; 3]) -> (Real, [Real; 3]) {
+        let (mut base, mut part) = ([0; 3], [0.0; 3]);
+        for a in self.grid.axes() {
+            let s = x[a].max(0.0).min(self.grid.n[a] as Real);
+            base[a] = (s as usize).min(self.grid.n[a] - 1);
+            part[a] = s - base[a] as Real;
+        }
+        self.among_nodes(self.grid.lattice().at(base[0], base[1], base[2]), part)
+    }
+
+    /// Distance and normal within a cell.
+    fn among_nodes(&self, cell: usize, part: [Real; 3]) -> (Real, [Real; 3]) {
+        let stride = self.grid.lattice().stride;
+        let (mut distance, mut slope) = (0.0, [0.0; 3]);
+        for corner in 0..8 {
+            let mut at = cell;
+            let mut weight = [1.0; 3];
+            let mut sign = [0.0; 3];
+            for a in self.grid.axes() {
+                let upper = corner >> a & 1 == 1;
+                at += if upper { stride[a] } else { 0 };
+                (weight[a], sign[a]) = if upper { (part[a], 1.0) } else { (1.0 - part[a], -1.0) };
+            }
+            if self.grid.flat.is_some_and(|flat| corner >> flat & 1 == 1) {
+                continue;
+            }
+            let d = self.nodes[at];
+            distance += weight[0] * weight[1] * weight[2] * d;
+            slope[0] += sign[0] * weight[1] * weight[2] * d;
+            slope[1] += weight[0] * sign[1] * weight[2] * d;
+            slope[2] += weight[0] * weight[1] * sign[2] * d;
+        }
+        let size = slope.iter().map(|s| s * s).sum::<Real>().sqrt();
+        (distance, if size > 0.0 { slope.map(|s| s / size) } else { [0.0; 3] })
+    }
+
     /// The area of a face [m²]; in the plane, of one metre across it.
     pub fn area(&self) -> f64 {
         (1..self.grid.dimension()).fold(1.0, |a, _| a * self.grid.dx)

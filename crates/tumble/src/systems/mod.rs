@@ -6,6 +6,7 @@ pub mod dynamics;
 pub mod gas;
 pub mod grains;
 pub mod heat;
+pub mod liquid;
 pub mod rigid;
 pub mod scenery;
 pub mod tracers;

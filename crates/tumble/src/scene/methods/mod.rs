@@ -6,6 +6,7 @@ mod dynamics;
 mod gas;
 mod grains;
 mod heat;
+mod liquid;
 mod rigid;
 mod tracers;
 mod vicsek;
@@ -24,13 +25,14 @@ use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
 /// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
-pub const METHODS: [&dyn MethodRules; 9] = [
+pub const METHODS: [&dyn MethodRules; 10] = [
     &dynamics::Rules,
     &tracers::Rules,
     &vicsek::Rules,
     &rigid::Rules,
     &grains::Rules,
     &gas::Rules,
+    &liquid::Rules,
     &heat::Rules,
     &compressible::Rules,
     &crowd::Rules,

@@ -1,0 +1,118 @@
+//! Liquids with a free surface on a grid.
+
+use super::{AnimatedVector, GridBox, OnFailure, Shape};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An incompressible liquid with a free surface in a box of cells: particles carry it, a grid finds its pressure. The sides of the box are walls along
+/// which it slips, as it does along colliders; it has no viscosity, no surface tension, and does not move what it meets. Its rows in frames are its
+/// particles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Liquid {
+    /// Name in frames and pictures.
+    pub name: String,
+    /// System that moves it. Default: the first of method `liquid`.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// The cells.
+    #[serde(rename = "box")]
+    pub cells: GridBox,
+    /// What it fills at the start. Where fills overlap, the first counts.
+    pub fill: Vec<LiquidFill>,
+    /// Density.
+    #[serde(default = "water")]
+    #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Particles along each edge of a cell at the start: 2 are 8 in a cell, 4 in the plane.
+    #[serde(default = "two")]
+    #[schemars(range(min = 1, max = 4))]
+    pub sampling: u32,
+    /// How velocities go from particles to the grid and back.
+    #[serde(default)]
+    pub transfer: LiquidTransfer,
+    /// Part of their own velocity that particles keep, with the change on the grid added (`transfer = "flip"` only): the rest is that of the grid, and 0
+    /// would be `pic`. Default: 0.97.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
+    pub flip_ratio: Option<f64>,
+    /// Whether a second solve moves particles from where they crowd to where they thin out, so that the liquid keeps its volume.
+    #[serde(default = "yes")]
+    pub keep_volume: bool,
+    /// Pressure solver: conjugate gradients preconditioned by multigrid.
+    #[serde(default)]
+    pub pressure: LiquidPressure,
+    /// Cells that the fastest particle crosses in a sub-step, if the system has neither `substeps` nor `step`.
+    #[serde(default = "one")]
+    #[schemars(range(max = 4.0), extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub courant: f64,
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB). Default: from dark to light with the speed.
+    #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
+    pub color: Option<[f64; 3]>,
+}
+
+fn water() -> f64 {
+    1000.0
+}
+
+fn two() -> u32 {
+    2
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// A volume that a liquid fills at the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LiquidFill {
+    /// Its shape; not a mesh. What lies outside the box or in a collider stays empty.
+    pub shape: Shape,
+    /// Velocity at the start; may be a formula of x, y, z.
+    #[serde(default = "still")]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: AnimatedVector,
+}
+
+fn still() -> AnimatedVector {
+    [0.0; 3].into()
+}
+
+/// How velocities go from particles to the grid and back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LiquidTransfer {
+    /// Particle in cell: a particle takes the velocity of the grid. Smooth, and damps strongly.
+    Pic,
+    /// Fluid implicit particle: it adds what the grid has changed. Lively and noisy.
+    Flip,
+    /// Affine particle in cell: it takes the velocity of the grid and its gradient. Smooth, and keeps angular momentum.
+    #[default]
+    Apic,
+}
+
+/// Pressure solver of a liquid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LiquidPressure {
+    /// Largest residual divergence, times dx, relative to the fastest velocity before the projection. Default: 1e-4 (single), 1e-9 (double).
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub tolerance: Option<f64>,
+    /// Maximum number of iterations.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub iterations: u32,
+    /// Behaviour when the tolerance is not met.
+    pub on_failure: OnFailure,
+}
+
+impl Default for LiquidPressure {
+    fn default() -> Self {
+        Self { tolerance: None, iterations: 200, on_failure: OnFailure::Warn }
+    }
+}

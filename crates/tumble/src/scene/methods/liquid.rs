@@ -1,0 +1,269 @@
+//! Liquids with a free surface: words to particles in a box.
+
+use super::{MethodRules, is_in};
+use crate::fluids::Solids;
+use crate::forces::Gravity;
+use crate::geometry::Collider;
+use crate::math::formula::Of;
+use crate::math::{Real, Vec3, VectorSignal};
+use crate::recipes::region;
+use crate::scene::Assets;
+use crate::scene::build::Builder;
+use crate::scene::grids::{cells, grid};
+use crate::scene::laws::{Reader, flat, off_plane};
+use crate::scene::plausible::odd_density;
+use crate::state::Grid;
+use crate::system::System;
+use crate::systems::liquid::{Accuracy, Liquid as Tanks, Particles, Settings, Tank, Transfer};
+use std::sync::Arc;
+use tumble_interface::looks::{Colors, FEW, Form, Look};
+use tumble_interface::scene::{Integrator, Liquid, LiquidFill, LiquidTransfer, Method, Scene, Shape, System as Plan};
+use tumble_interface::warning::Code;
+use tumble_interface::{Issue, Warning};
+
+/// Largest |div u| dx over the fastest velocity.
+#[cfg(not(feature = "double"))]
+const TOLERANCE: f64 = 1e-4;
+/// Largest |div u| dx over the fastest velocity.
+#[cfg(feature = "double")]
+const TOLERANCE: f64 = 1e-9;
+/// Part of its own velocity that a particle keeps.
+const FLIP: f64 = 0.97;
+
+/// Numbers for a cell: velocities three times with weights and ways, pressure, surface, density, and a solver that is made anew.
+const CELL: f64 = 40.0;
+/// Numbers for a particle: its rows twice, and a snapshot.
+const PARTICLE: f64 = 60.0;
+
+pub struct Rules;
+
+impl MethodRules for Rules {
+    fn words(&self) -> &'static [Method] {
+        &[Method::Liquid]
+    }
+
+    fn kinds(&self) -> &'static [&'static str] {
+        &["liquid"]
+    }
+
+    fn massless(&self) -> Option<&'static str> {
+        Some("particles of a liquid on a grid")
+    }
+
+    fn meets_colliders(&self) -> bool {
+        true
+    }
+
+    fn refusal(&self, integrator: Integrator) -> Option<String> {
+        (integrator != Integrator::default()).then(|| "liquids on a grid have a scheme of their own and no integrator; leave it out".into())
+    }
+
+    fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
+        for thing in &scene.liquid {
+            if thing.flip_ratio.is_some() && thing.transfer != LiquidTransfer::Flip {
+                let message = "given without transfer = \"flip\"; leave it out, or set that";
+                issues.push(Issue::new(format!("liquid \"{}\".flip_ratio", thing.name), message));
+            }
+        }
+    }
+
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        let odd = |thing: &Liquid| odd_density(format!("liquid \"{}\".density", thing.name), thing.density, 0.0);
+        let mut warnings: Vec<Warning> = scene.liquid.iter().filter_map(odd).collect();
+        let mut others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "liquid"));
+        if let (Some(other), false) = (others.next(), scene.liquid.is_empty()) {
+            let message = format!("liquids on a grid meet colliders, but not yet what [[{}]] consists of, nor each other", other.kind);
+            warnings.push(Warning::new(Code::Unfelt, format!("liquid \"{}\"", scene.liquid[0].name), message));
+        }
+        warnings
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let own = scene.liquid.iter().filter(|thing| is_in(&thing.system, plan));
+        own.map(|thing| {
+            let radius = 0.5 * spacing(thing, flat(scene));
+            let few = fill_cells(thing, flat(scene)) * per_cell(thing, flat(scene)) < FEW;
+            Look { few, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) }
+        })
+        .collect()
+    }
+
+    fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
+        let flat = flat(scene);
+        let of = |thing: &Liquid| CELL * cells(&thing.cells, flat) + PARTICLE * per_cell(thing, flat) * fill_cells(thing, flat);
+        scene.liquid.iter().map(of).sum::<f64>() * size_of::<Real>() as f64
+    }
+
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
+        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity.clone());
+        let mut tanks = Vec::new();
+        for words in scene.liquid.iter().filter(|words| is_in(&words.system, plan)) {
+            let path = format!("liquid \"{}\"", words.name);
+            let reader = Reader::new(scene, &mut builder.issues);
+            tanks.extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders }.tank(gravity.clone()));
+        }
+        Some(Box::new(Tanks::new(plan.name.clone(), plan.substeps, plan.step, tanks)))
+    }
+}
+
+/// Particles in a cell.
+fn per_cell(words: &Liquid, flat: Option<usize>) -> f64 {
+    f64::from(words.sampling).powi(if flat.is_some() { 2 } else { 3 })
+}
+
+/// Length of a cell [m].
+fn cell(words: &Liquid, flat: Option<usize>) -> f64 {
+    let long = (0..3).filter(|a| flat != Some(*a)).map(|a| words.cells.size[a]).fold(0.0, f64::max);
+    long / f64::from(words.cells.resolution)
+}
+
+/// Distance of particles at the start [m].
+fn spacing(words: &Liquid, flat: Option<usize>) -> f64 {
+    cell(words, flat) / f64::from(words.sampling)
+}
+
+/// Cells that the fills take, at most.
+fn fill_cells(words: &Liquid, flat: Option<usize>) -> f64 {
+    let dx = cell(words, flat);
+    let axes: Vec<usize> = (0..3).filter(|a| flat != Some(*a)).collect();
+    let all = |size: &dyn Fn(usize) -> f64| axes.iter().map(|a| (size(*a).min(words.cells.size[*a]) / dx).ceil()).product::<f64>();
+    let of = |fill: &LiquidFill| match &fill.shape {
+        Shape::Box { size, .. } => all(&|a| size[a]),
+        Shape::Sphere { radius, .. } => all(&|_| 2.0 * radius),
+        _ => all(&|_| f64::INFINITY),
+    };
+    words.fill.iter().map(of).sum::<f64>().min(all(&|_| f64::INFINITY))
+}
+
+/// Reads the words of one liquid; everything wrong goes to the reader.
+struct Read<'a, 'b> {
+    words: &'a Liquid,
+    path: String,
+    reader: Reader<'b>,
+    flat: Option<usize>,
+    solids: &'a Arc<Vec<Collider>>,
+}
+
+impl Read<'_, '_> {
+    fn wrong(&mut self, key: &str, message: impl Into<String>) {
+        self.reader.issues.push(Issue::new(format!("{}{key}", self.path), message));
+    }
+
+    fn tank(mut self, gravity: Gravity) -> Option<Tank> {
+        let (words, before) = (self.words, self.reader.issues.len());
+        let grid = match grid(&words.cells, self.flat, [false; 3]) {
+            Ok(grid) => grid,
+            Err(error) => {
+                self.wrong(".box", error.to_string());
+                return None;
+            }
+        };
+        if words.fill.is_empty() {
+            self.wrong(".fill", "empty, expected at least one volume, such as { shape = { box = { size = [1, 1, 1] } } }");
+        }
+        let fills: Vec<Option<(Collider, VectorSignal)>> = words.fill.iter().enumerate().map(|(i, fill)| self.fill(i, fill)).collect();
+        if self.reader.issues.len() > before {
+            return None;
+        }
+        let fills: Vec<(Collider, VectorSignal)> = fills.into_iter().flatten().collect();
+        let mut solids = Solids::new(self.solids.clone(), Vec::new(), false, grid, &Default::default());
+        solids.place(0.0);
+        let solids = (solids.moves() || !solids.is_empty()).then_some(solids);
+        let (x, v, counts) = particles(&grid, words.sampling, &fills, solids.as_ref());
+        for (i, _) in counts.iter().enumerate().filter(|(_, count)| **count == 0) {
+            let message = "it fills nothing; move it into the box and out of colliders and other fills, or make it as large as a cell";
+            self.wrong(&format!(".fill[{i}].shape"), message);
+        }
+        if let Some(v) = v.iter().find(|v| v.iter().any(|v| !v.is_finite())) {
+            self.wrong(".fill", format!("a velocity of {v:?} m/s, expected finite numbers in all of a fill"));
+        }
+        if self.reader.issues.len() > before {
+            return None;
+        }
+        let transfer = match words.transfer {
+            LiquidTransfer::Pic => Transfer::Pic,
+            LiquidTransfer::Flip => Transfer::Flip(words.flip_ratio.unwrap_or(FLIP)),
+            LiquidTransfer::Apic => Transfer::Apic,
+        };
+        let settings = Settings {
+            density: words.density,
+            particle: 1.0 / per_cell(words, self.flat),
+            transfer,
+            keep_volume: words.keep_volume,
+            // So fast is what falls from the top of the box.
+            shade: words.color.is_none().then(|| (2.0 * gravity.largest * grid.n[2] as f64 * grid.dx).sqrt()),
+            gravity,
+            accuracy: Accuracy {
+                tolerance: words.pressure.tolerance.unwrap_or(TOLERANCE),
+                iterations: words.pressure.iterations as usize,
+                on_failure: words.pressure.on_failure,
+            },
+            courant: words.courant,
+        };
+        let particles = Particles::new(x, v, transfer == Transfer::Apic);
+        match Tank::new(words.name.clone(), settings, grid, solids, particles) {
+            Ok(tank) => Some(tank),
+            Err(error) => {
+                self.wrong(".box", error.to_string());
+                None
+            }
+        }
+    }
+
+    /// A volume, and the velocity in it.
+    fn fill(&mut self, index: usize, fill: &LiquidFill) -> Option<(Collider, VectorSignal)> {
+        let key = |key: &str| format!(".fill[{index}].{key}");
+        if matches!(fill.shape, Shape::Lathe { .. } | Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_)) {
+            self.wrong(&key("shape"), "a mesh or a solid of revolution, expected sphere, box, plane, floor or capsule");
+            return None;
+        }
+        let velocity = self.reader.vector(&format!("{}{}", self.path, key("velocity")), &fill.velocity, Of::Start);
+        if let Some(axis) = self.flat
+            && velocity.is_constant()
+        {
+            let across = <[f64; 3]>::from(velocity.value(0.0))[axis];
+            if across != 0.0 {
+                self.wrong(&key("velocity"), off_plane(axis, across));
+            }
+        }
+        match region(&fill.shape) {
+            Ok(region) => Some((region, velocity)),
+            Err((at, message)) => {
+                self.wrong(&key(&format!("shape{at}")), message);
+                None
+            }
+        }
+    }
+}
+
+/// Places [cells] and velocities [m/s] of particles, and how many of them are in each fill: on a lattice, so many along the edge of a cell.
+fn particles(
+    grid: &Grid,
+    sampling: u32,
+    fills: &[(Collider, VectorSignal)],
+    solids: Option<&Solids>,
+) -> (Vec<[Real; 3]>, Vec<[Real; 3]>, Vec<usize>) {
+    let (mut x, mut v, mut counts) = (Vec::new(), Vec::new(), vec![0; fills.len()]);
+    let along = |a: usize| if grid.flat == Some(a) { 1 } else { grid.n[a] * sampling as usize };
+    let edge = 1.0 / f64::from(sampling);
+    for k in 0..along(2) {
+        for j in 0..along(1) {
+            for i in 0..along(0) {
+                let lattice = [i, j, k];
+                let at: [f64; 3] = std::array::from_fn(|a| if grid.flat == Some(a) { 0.5 } else { edge * (lattice[a] as f64 + 0.5) });
+                let place = Vec3::from(std::array::from_fn(|a| grid.origin[a] + if grid.flat == Some(a) { 0.0 } else { grid.dx * at[a] }));
+                let Some(fill) = fills.iter().position(|(shape, _)| shape.distance(place, 0.0, grid.dx).0 <= 0.0) else { continue };
+                let at = at.map(|x| x as Real);
+                if solids.is_some_and(|solids| solids.near(&at).0 <= 0.0) {
+                    continue;
+                }
+                counts[fill] += 1;
+                let mut velocity: [f64; 3] = fills[fill].1.at(0.0, place, [0.0; 3].into()).into();
+                grid.flat.into_iter().for_each(|flat| velocity[flat] = 0.0);
+                x.push(at);
+                v.push(velocity.map(|v| v as Real));
+            }
+        }
+    }
+    (x, v, counts)
+}

@@ -1,0 +1,393 @@
+//! A liquid in its box: its state, and a step.
+
+use super::extend::{self, Marks, empty, extend, mark};
+use super::level::{Level, cell, share};
+use super::particles::{Gradient, Particles};
+use super::pressure::{Accuracy, Matrix};
+use super::splat::{self, LEAST};
+use super::stencil::Sampler;
+use crate::fluids::{Beyond, Failure, Solids};
+use crate::forces::Gravity;
+use crate::geometry::Collider;
+use crate::math::parallel::{CHUNK, Tasks, chunks, fold};
+use crate::math::{Column, Real, Spare};
+use crate::state::{Field, Grid, GridError, Place, Vectors};
+use std::sync::Arc;
+use tumble_interface::engine::StepReport;
+
+/// Layers beyond the liquid that take its velocity, whatever particles there carry: those of its surface.
+const SKIN: usize = 2;
+/// How far from a side of the box particles stay [cells].
+const SIDE: Real = 1e-3;
+/// How far from a solid particles stay [cells].
+const GAP: Real = 0.05;
+
+/// How velocities go from particles to the grid and back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Transfer {
+    /// Particles take the velocity of the grid.
+    Pic,
+    /// They add what the grid has changed, and take this part of the sum, the rest from the grid.
+    Flip(f64),
+    /// They take the velocity of the grid and its gradient.
+    Apic,
+}
+
+/// Constant settings of a liquid.
+pub struct Settings {
+    /// Density [kg/m³].
+    pub density: f64,
+    /// Volume of a particle [cells].
+    pub particle: f64,
+    /// How velocities go from particles to the grid and back.
+    pub transfer: Transfer,
+    /// Whether particles are moved from where they crowd.
+    pub keep_volume: bool,
+    /// Speed at which particles are lightest in pictures [m/s]; `None` for one colour.
+    pub shade: Option<f64>,
+    /// Gravity.
+    pub gravity: Gravity,
+    /// How the pressure is found.
+    pub accuracy: Accuracy,
+    /// Cells that the fastest particle crosses in a sub-step.
+    pub courant: f64,
+}
+
+/// A liquid in a box.
+pub struct Tank {
+    /// Name of the object.
+    pub name: String,
+    /// Constant settings.
+    pub settings: Settings,
+    /// Its particles.
+    pub particles: Particles,
+    /// Pressure of the last projection at cells [Pa], beside the liquid as it goes on.
+    pub pressure: Field,
+    /// The last step [s]; 0 at the start.
+    pub last: f64,
+    pub(super) level: Level,
+    pub(super) solids: Option<Solids>,
+    grid: Grid,
+    sides: [[Beyond; 2]; 3],
+    /// Velocity on faces [m/s], and the weight of the particles around.
+    u: Vectors,
+    weights: Vec<Column>,
+    /// Ways of particles in a step [cells].
+    way: Vectors,
+    /// Velocities before forces, and which faces have one.
+    before: Vectors,
+    reached: Marks,
+    /// Number of particles at cells over that at rest.
+    crowd: Field,
+    /// The part of the space around a cell that solids leave to the liquid.
+    room: Option<Vec<Real>>,
+    /// Marks of faces in the empty box.
+    marks: Marks,
+    spare: Spare,
+}
+
+impl Tank {
+    /// A liquid of these particles around these solids, which are where they are at t = 0.
+    pub fn new(name: String, settings: Settings, grid: Grid, solids: Option<Solids>, particles: Particles) -> Result<Self, GridError> {
+        let mut tank = Self {
+            name,
+            particles,
+            pressure: Field::new(grid, Place::Cell, "Pa")?,
+            last: 0.0,
+            level: Level::new(grid)?,
+            grid,
+            sides: Default::default(),
+            u: Vectors::faces(grid, "m/s")?,
+            weights: grid.axes().map(|_| Column::zeros(grid.lattice().len())).collect(),
+            way: Vectors::faces(grid, "1")?,
+            before: Vectors::faces(grid, "m/s")?,
+            reached: Marks::new(),
+            crowd: Field::new(grid, Place::Cell, "1")?,
+            room: None,
+            marks: Marks::new(),
+            spare: Spare::default(),
+            solids,
+            settings,
+        };
+        tank.settle();
+        tank.prepare();
+        Ok(tank)
+    }
+
+    /// Its cells.
+    pub fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// The volume of a cell [m³]; in the plane, of one metre across it.
+    pub fn cell_volume(&self) -> f64 {
+        (0..self.grid.dimension()).fold(1.0, |v, _| v * self.grid.dx)
+    }
+
+    /// The mass of a particle [kg].
+    pub fn particle_mass(&self) -> f64 {
+        self.settings.density * self.settings.particle * self.cell_volume()
+    }
+
+    /// The volume of the liquid by its surface [m³].
+    pub fn volume(&self) -> f64 {
+        self.level.volume * self.cell_volume()
+    }
+
+    /// Takes the solids around it.
+    pub fn take_surfaces(&mut self, colliders: &Arc<Vec<Collider>>) {
+        if self.solids.as_mut().is_some_and(|solids| solids.take_surfaces(colliders)) {
+            self.settle();
+            self.prepare();
+        }
+    }
+
+    /// Puts the solids where they are at time t [s].
+    pub fn put(&mut self, t: f64) {
+        if let Some(solids) = self.solids.as_mut().filter(|solids| solids.time != t) {
+            solids.place(t);
+            self.settle();
+        }
+    }
+
+    /// What follows from where the solids are.
+    fn settle(&mut self) {
+        let open = self.solids.as_ref().map(|solids| &solids.open);
+        self.marks = empty(&self.grid, open);
+        self.room = self.solids.as_ref().map(|solids| room(&self.grid, solids));
+    }
+
+    /// Sorts its particles, finds its surface and how densely it lies; all are functions of where they are.
+    pub fn prepare(&mut self) {
+        let Self { particles, level, crowd, room, settings, solids, grid, .. } = self;
+        particles.sort(grid.n);
+        level.measure(particles, settings.particle, solids.as_ref());
+        splat::to_cells(particles, crowd);
+        let scale = settings.particle as Real;
+        chunks(&mut crowd.data, |start, crowd| {
+            for (i, crowd) in crowd.iter_mut().enumerate() {
+                *crowd *= scale / room.as_ref().map_or(1.0, |room| room[start + i]);
+            }
+        });
+    }
+
+    /// The largest component of the velocity of a particle, and of solids across faces [m/s].
+    pub fn fastest(&self) -> f64 {
+        let most = |range: std::ops::Range<usize>| {
+            let worse = |most: Real, v: &Real| if v.abs() > most || v.is_nan() { v.abs() } else { most };
+            self.particles.v[range].iter().flatten().fold(0.0, worse)
+        };
+        let particles = fold(self.particles.count(), most).into_iter().fold(0.0, |a: Real, b| if a >= b || a.is_nan() { a } else { b });
+        f64::from(particles).max(self.solids.as_ref().map_or(0.0, Solids::fastest_cut))
+    }
+
+    /// The largest step [s] of the Courant number at time t, within `left` [s]: gravity speeds it up on the way.
+    pub fn courant_step(&self, t: f64, left: f64) -> f64 {
+        let (way, speed) = (self.settings.courant * self.grid.dx, self.fastest());
+        let g = self.settings.gravity.at(t).iter().map(|g| g * g).sum::<f64>().sqrt();
+        // The second half h with all of its gravity: (v + 2 h g) h = way.
+        let half = if speed > 0.0 || g > 0.0 { 2.0 * way / (speed + (speed * speed + 8.0 * g * way).sqrt()) } else { left };
+        (2.0 * half).min(left)
+    }
+
+    /// One step of h seconds from t to `end` [s]: in the first half, without forces, the pressure acts twice.             (pic.7)
+    pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Failure> {
+        self.last = h;
+        self.half((t, t + 0.5 * h), h, false, report)?;
+        let first = self.pressure.data.clone();
+        self.half((t + 0.5 * h, end), h, true, report)?;
+        chunks(&mut self.pressure.data, |start, p| p.iter_mut().zip(&first[start..]).for_each(|(p, first)| *p += 2.0 * first));
+        Ok(())
+    }
+
+    /// Half of a step of h seconds between two times [s].
+    fn half(&mut self, (from, to): (f64, f64), h: f64, second: bool, report: &mut StepReport) -> Result<(), Failure> {
+        let half = 0.5 * h;
+        report.passed(self.fastest() * half / self.grid.dx);
+        let mut matrix = Matrix::new(&self.level, self.solids.as_ref(), &self.sides, std::mem::take(&mut self.spare))?;
+        if self.settings.keep_volume {
+            matrix.displace(&self.crowd, &self.level, self.solids.as_ref(), &mut self.way, report)?;
+        }
+        self.give_to_grid();
+        if second {
+            self.accelerate(from, h);
+        }
+        let Self { u, pressure, level, solids, sides, settings, .. } = self;
+        matrix.project(u, pressure, level, (solids.as_ref(), sides), (to, h, settings.density), settings.accuracy, report)?;
+        self.spare = matrix.into_spare();
+        self.reach_out(half);
+        self.give_to_particles(second);
+        if self.solids.as_ref().is_some_and(Solids::moves) {
+            self.put(to);
+        }
+        self.push_out();
+        self.prepare();
+        Ok(())
+    }
+
+    /// Velocities of particles to faces.
+    fn give_to_grid(&mut self) {
+        splat::to_faces(&self.particles, &mut self.u, &mut self.weights);
+        self.reached.clone_from(&self.marks);
+        know(&mut self.reached, &mut self.weights);
+        // The liquid may reach beyond the faces that its particles reach.
+        extend(&mut self.u, &mut self.reached, 1 + SKIN);
+        for (before, u) in self.before.parts.iter_mut().zip(&self.u.parts) {
+            before.data.copy_from_slice(&u.data);
+        }
+    }
+
+    /// Gravity for h seconds.
+    fn accelerate(&mut self, t: f64, h: f64) {
+        let gravity = self.settings.gravity.at(t);
+        for ((part, marks), axis) in self.u.parts.iter_mut().zip(&self.reached).zip(self.grid.axes()) {
+            let gain = (h * gravity[axis]) as Real;
+            if gain != 0.0 {
+                chunks(&mut part.data, |start, u| {
+                    u.iter_mut().zip(&marks[start..]).filter(|(_, mark)| **mark == mark::KNOWN).for_each(|(u, _)| *u += gain);
+                });
+            }
+        }
+    }
+
+    /// Velocities, and ways, of faces around the liquid.                                                        (pic.8)
+    fn reach_out(&mut self, h: f64) {
+        let mut liquid = self.marks.clone();
+        self.know_liquid(&mut liquid);
+        // The change goes on beyond the surface.
+        let mut marks = liquid.clone();
+        add(&mut self.u, -1.0, &self.before);
+        extend(&mut self.u, &mut marks, SKIN);
+        add(&mut self.u, 1.0, &self.before);
+        for ((marks, liquid), reached) in marks.iter_mut().zip(&liquid).zip(&self.reached) {
+            chunks(marks, |start, marks| {
+                for ((mark, liquid), reached) in marks.iter_mut().zip(&liquid[start..]).zip(&reached[start..]) {
+                    if *mark == mark::KNOWN && *liquid == mark::FREE {
+                        *mark = *reached;
+                    }
+                }
+            });
+        }
+        // Farther out particles fly by themselves.
+        know(&mut marks, &mut self.weights);
+        extend(&mut self.u, &mut marks, 2 + self.settings.courant as usize);
+        if let Some(solids) = &self.solids {
+            solids.extend(&mut self.u);
+        }
+        let (scale, displaced) = ((h / self.grid.dx) as Real, self.settings.keep_volume);
+        if displaced {
+            extend(&mut self.way, &mut liquid, SKIN);
+        }
+        for (way, u) in self.way.parts.iter_mut().zip(&self.u.parts) {
+            chunks(&mut way.data, |start, way| {
+                for (way, u) in way.iter_mut().zip(&u.data[start..]) {
+                    *way = scale * u + if displaced { *way } else { 0.0 };
+                }
+            });
+        }
+    }
+
+    /// Marks free faces beside the liquid as known.
+    fn know_liquid(&self, marks: &mut Marks) {
+        let stride = self.grid.lattice().stride;
+        for (marks, axis) in marks.iter_mut().zip(self.grid.axes()) {
+            let cells = &self.level.cells;
+            chunks(marks, |start, marks| {
+                for (i, mark) in marks.iter_mut().enumerate() {
+                    let at = start + i;
+                    if *mark == mark::FREE && (cells[at] == cell::LIQUID || cells[at - stride[axis]] == cell::LIQUID) {
+                        *mark = mark::KNOWN;
+                    }
+                }
+            });
+        }
+    }
+
+    /// Velocities of faces to particles, which then go their way.                                               (pic.2, pic.3)
+    fn give_to_particles(&mut self, second: bool) {
+        let Self { particles, u, way, before, settings, grid, .. } = self;
+        let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
+        let Particles { x, v, gradient, .. } = particles;
+        let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
+        let tops = grid.n.map(|n| n as Real - SIDE);
+        // What the pressure has changed counts twice in the first half.
+        let more = if second { 0.0 } else { 1.0 };
+        let tasks = x.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)).zip(gradients);
+        tasks.in_parallel(|((x, v), mut gradient): ((_, _), Option<&mut [Gradient]>)| {
+            for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                let carried = |new: Real, old: Real| new + more * (new - old);
+                if let Some(gradient) = &mut gradient {
+                    let ((new, slope), (old, before)) = (velocity.with_gradient(x), before.with_gradient(x));
+                    *v = std::array::from_fn(|a| carried(new[a], old[a]));
+                    gradient[i] = std::array::from_fn(|a| std::array::from_fn(|b| carried(slope[a][b], before[a][b])));
+                } else {
+                    let (new, old) = (velocity.read(x), before.read(x));
+                    let ratio = if let Transfer::Flip(ratio) = settings.transfer { ratio as Real } else { 0.0 };
+                    *v = std::array::from_fn(|a| carried(new[a], old[a]) + ratio * (v[a] - old[a]));
+                }
+                // Straight on: what goes its way with its own velocity keeps its angular momentum.
+                let all = way.read(x);
+                for a in grid.axes() {
+                    x[a] = (x[a] + all[a]).max(SIDE).min(tops[a]);
+                }
+            }
+        });
+    }
+
+    /// Moves particles out of solids.
+    pub(super) fn push_out(&mut self) {
+        let Some(solids) = &self.solids else { return };
+        let (grid, scale) = (self.grid, (1.0 / self.grid.dx) as Real);
+        chunks(&mut self.particles.x, |_, x| {
+            for x in x {
+                let (distance, normal) = solids.near(x);
+                let lack = GAP - scale * distance;
+                if lack > 0.0 {
+                    for a in grid.axes() {
+                        x[a] = (x[a] + lack * normal[a]).max(SIDE).min(grid.n[a] as Real - SIDE);
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Adds so many times other velocities.
+fn add(u: &mut Vectors, factor: Real, others: &Vectors) {
+    for (u, other) in u.parts.iter_mut().zip(&others.parts) {
+        chunks(&mut u.data, |start, u| u.iter_mut().zip(&other.data[start..]).for_each(|(u, other)| *u += factor * other));
+    }
+}
+
+/// Marks free faces with particles around as known.
+fn know(marks: &mut Marks, weights: &mut [Column]) {
+    marks.iter_mut().zip(weights).for_each(|(marks, weight)| extend::know(marks, weight, LEAST));
+}
+
+/// The part of the space around each cell that solids leave, by the weights of a particle, averaged over a cell.
+fn room(grid: &Grid, solids: &Solids) -> Vec<Real> {
+    let (lattice, scale) = (grid.lattice(), (1.0 / grid.dx) as Real);
+    let mut room = vec![1.0; lattice.len()];
+    let rows = |f: &mut dyn FnMut(usize)| {
+        for k in 0..grid.n[2] {
+            for j in 0..grid.n[1] {
+                f(lattice.at(0, j, k));
+            }
+        }
+    };
+    rows(&mut |row| (row..row + grid.n[0]).for_each(|at| room[at] = share(scale * solids.middle(at))));
+    for axis in grid.axes() {
+        let (old, step) = (room.clone(), lattice.stride[axis]);
+        rows(&mut |row| {
+            for at in row..row + grid.n[0] {
+                let along = lattice.place(at)[axis];
+                let low = if along == 0 { at } else { at - step };
+                let high = if along + 1 == grid.n[axis] { at } else { at + step };
+                room[at] = 0.125 * (old[low] + old[high]) + 0.75 * old[at];
+            }
+        });
+    }
+    // Where solids leave next to nothing, a particle is no crowd.
+    room.iter_mut().for_each(|room| *room = room.max(0.1));
+    room
+}
