@@ -9,7 +9,22 @@ from typing import Annotated
 
 import typer
 
-from tumble.cli import bottlenecks, branch, check, diff, export, lab, plot, refine, render, run, scenes, schema, sweep, view
+from tumble.cli import (
+    bottlenecks,
+    branch,
+    check,
+    diff,
+    export,
+    lab,
+    plot,
+    refine,
+    render,
+    run,
+    scenes,
+    schema,
+    sweep,
+    view,
+)
 from tumble.cli.console import heed_termination, lost_frames_told, survive_narrow_streams
 from tumble.cli.verbs import Root, Verb
 
