@@ -285,6 +285,9 @@ fn one(around: &Around<'_>, way: &Way, model: &Model, h: f64) -> (Point, f64) {
     let room = (1.0 - BLEND) * around.room(e).min(1e6) + BLEND * around.room(wanted).min(1e6);
     let v = ((room - model.buffer) / model.time_gap).clamp(BACK, me.speed);
     let u = along(around.makes_way(), v, e);
+    // Nobody is faster than it wants to be.
+    let size = length(u);
+    let u = if size > me.speed { u.map(|u| u * me.speed / size) } else { u };
     (around.feasible(u.map(|u| u * h)), heading)
 }
 
