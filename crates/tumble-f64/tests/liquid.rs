@@ -212,7 +212,7 @@ fn a_disc_that_turns_keeps_its_angular_momentum_by_affine_transfers() {
     };
     let [apic, flip, pic] = ["apic", "flip", "pic"].map(turn);
     println!("angular momentum and energy after a turn: APIC {apic:?}, FLIP {flip:?}, PIC {pic:?}");
-    assert!((apic.0 - 1.0).abs() < 0.01 && (flip.0 - 1.0).abs() < 0.02 && pic.0 < 0.87, "{apic:?} {flip:?} {pic:?}");
+    assert!((apic.0 - 1.0).abs() < 0.01 && (flip.0 - 1.0).abs() < 0.02 && 1.0 - pic.0 > 10.0 * (1.0 - apic.0), "{apic:?} {flip:?} {pic:?}");
 }
 
 #[test]

@@ -513,6 +513,7 @@ fn held(most: u8) -> Level {
 }
 
 /// Whether kernels are compiled for AVX2 and single numbers alone, which takes a third off the time of development builds.
+#[cfg(target_arch = "x86_64")]
 const QUICK: bool = cfg!(debug_assertions);
 
 /// Runs a kernel on registers no wider than `level`.

@@ -22,6 +22,9 @@ const SIDE: Real = 1e-3;
 /// How far from a solid particles stay [cells].
 const GAP: Real = 0.05;
 
+/// Parts of a cell in which particles go near solids; walls count as two cells thick.
+const STRIDES: Real = 4.0;
+
 /// How velocities go from particles to the grid and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Transfer {
@@ -305,7 +308,7 @@ impl Tank {
 
     /// Velocities of faces to particles, which then go their way.                                               (pic.2, pic.3)
     fn give_to_particles(&mut self, second: bool) {
-        let Self { particles, u, way, before, settings, grid, .. } = self;
+        let Self { particles, u, way, before, settings, solids, grid, .. } = self;
         let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
         let Particles { x, v, gradient, .. } = particles;
         let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
@@ -327,8 +330,14 @@ impl Tank {
                 }
                 // Straight on: what goes its way with its own velocity keeps its angular momentum.
                 let all = way.read(x);
-                for a in grid.axes() {
-                    x[a] = (x[a] + all[a]).max(SIDE).min(tops[a]);
+                let strides = solids.as_ref().map_or(1, |solids| strides(solids, grid, x, &all));
+                for _ in 0..strides {
+                    for a in grid.axes() {
+                        x[a] = (x[a] + all[a] / strides as Real).max(SIDE).min(tops[a]);
+                    }
+                    if let (true, Some(solids)) = (strides > 1, solids.as_ref()) {
+                        push_out(solids, grid, x);
+                    }
                 }
             }
         });
@@ -337,19 +346,29 @@ impl Tank {
     /// Moves particles out of solids.
     pub(super) fn push_out(&mut self) {
         let Some(solids) = &self.solids else { return };
-        let (grid, scale) = (self.grid, (1.0 / self.grid.dx) as Real);
-        chunks(&mut self.particles.x, |_, x| {
-            for x in x {
-                let (distance, normal) = solids.near(x);
-                let lack = GAP - scale * distance;
-                if lack > 0.0 {
-                    for a in grid.axes() {
-                        x[a] = (x[a] + lack * normal[a]).max(SIDE).min(grid.n[a] as Real - SIDE);
-                    }
-                }
-            }
-        });
+        let grid = self.grid;
+        chunks(&mut self.particles.x, |_, x| x.iter_mut().for_each(|x| push_out(solids, &grid, x)));
     }
+}
+
+/// Moves a particle out of solids.
+fn push_out(solids: &Solids, grid: &Grid, x: &mut [Real; 3]) {
+    let (distance, normal) = solids.near(x);
+    let lack = GAP - distance * (1.0 / grid.dx) as Real;
+    if lack > 0.0 {
+        for a in grid.axes() {
+            x[a] = (x[a] + lack * normal[a]).max(SIDE).min(grid.n[a] as Real - SIDE);
+        }
+    }
+}
+
+/// Parts of a way [cells] that may lead into a solid: so short that what enters one is put back on the side from which it came.
+fn strides(solids: &Solids, grid: &Grid, x: &[Real; 3], way: &[Real; 3]) -> usize {
+    let long = grid.axes().map(|a| way[a] * way[a]).sum::<Real>().sqrt();
+    if solids.near(x).0 * (1.0 / grid.dx) as Real > long + GAP {
+        return 1;
+    }
+    1 + (STRIDES * long).min(64.0) as usize
 }
 
 /// Adds so many times other velocities.

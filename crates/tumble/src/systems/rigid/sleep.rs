@@ -123,7 +123,7 @@ impl Sleep {
             self.still[i] = if self.may[i] && slow && bodies.is_there(i) { self.still[i] + h } else { 0.0 };
         }
         held.for_each(|i| self.wake(i as usize));
-        let ready = |still: f64| still >= WHILE && still < f64::INFINITY;
+        let ready = |still: f64| (WHILE..f64::INFINITY).contains(&still);
         if !self.still.iter().any(|still| ready(*still)) {
             return;
         }
