@@ -63,7 +63,7 @@ class Ledger(TypedDict):
     heat_in: float | None
     """Heat that has come in through surfaces and from sources [J]."""
     volume: float | None
-    """Volume inside closed surfaces of soft objects [m³]."""
+    """Volume inside closed surfaces of soft objects, and of liquids on grids, in a plane for a metre across it [m³]."""
     people: int | None
     """People on the floor."""
     left: int | None
