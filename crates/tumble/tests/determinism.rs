@@ -115,8 +115,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let dam = "time.fps = 50\n[[liquid]]\nname = \"water\"\nTRANSFER\nbox = { size = [1, 0.6, 0.8], center = [0.5, 0.3, 0.4], resolution = 24 }\n\
                fill = [{ shape = { box = { center = [0.2, 0.3, 0.3], size = [0.4, 0.6, 0.6] } } },\n\
                        { shape = { sphere = { center = [0.7, 0.3, 0.5], radius = 0.13 } }, velocity = [0.3, \"sin(9*x)\", 0] }]\n\
-               [[collider]]\nname = \"post\"\nshape.capsule = { from = [0.7, 0.3, 0], to = [0.7, 0.3, 0.3], radius = 0.08 }\n\
-               [[collider]]\nname = \"paddle\"\nmotion = { velocity = [-0.4, 0, 0.2], spin = [0, 2, 0] }\nshape.box = { center = [0.9, 0.3, 0.1], size = [0.1, 0.4, 0.2] }\n";
+               [[collider]]\nname = \"post\"\nshape.capsule = { from = [0.7, ACROSS, 0], to = [0.7, ACROSS, 0.3], radius = 0.08 }\n\
+               [[collider]]\nname = \"paddle\"\nmotion = { velocity = [-0.4, 0, 0.2], spin = [0, 2, 0] }\nshape.box = { center = [0.9, ACROSS, 0.1], size = [0.1, 0.4, 0.2] }\n";
     vec![
         ("sheet, air, position based", sheet("method = \"position_based\"\nsubsteps = 8", links) + air, 20),
         ("sheet, air, explicit", sheet("integrator = \"rk4\"\nsubsteps = 24", links) + air, 6),
@@ -143,11 +143,11 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("block, shape", shape.to_string(), 10),
         ("blocks, rigid, thrown", thrown.to_string(), 20),
         ("pool", pool.to_string(), 6),
-        ("dam, affine", dam.replace("TRANSFER", ""), 8),
-        ("dam, FLIP", dam.replace("TRANSFER", "transfer = \"flip\""), 8),
+        ("dam, affine", dam.replace("TRANSFER", "").replace("ACROSS", "0.3"), 8),
+        ("dam, FLIP", dam.replace("TRANSFER", "transfer = \"flip\"").replace("ACROSS", "0.3"), 8),
         (
             "dam, PIC, in a plane",
-            format!("dimension = 2\n{}", dam.replace("TRANSFER", "transfer = \"pic\"").replace("\"sin(9*x)\"", "0")),
+            format!("dimension = 2\n{}", dam.replace("TRANSFER", "transfer = \"pic\"").replace("ACROSS", "0").replace("\"sin(9*x)\"", "0")),
             12,
         ),
         ("smoke", smoke.to_string(), 16),
