@@ -526,6 +526,7 @@ def test_every_verb_teaches_by_example(tumble: Command) -> None:
         "render",
         "export",
         "plot",
+        "bottlenecks",
         "branch",
         "diff",
         "refine",

@@ -389,13 +389,13 @@ def test_a_sweep_that_is_stopped_goes_on(
     assert process.stderr is not None
     for line in process.stderr:
         match = re.match(r"sweep +([0-9]+) /", line)
-        if match and int(match[1]) >= 3:
+        if match and int(match[1]) >= 1:
             # As a terminal sends Ctrl-C: to workers, too.
             os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)
             break
     _, err = process.communicate()
     done = {path: path.stat().st_mtime_ns for path in folder.glob("rows/*/*.json")}
-    assert 3 <= len(done) < RUNS
+    assert 1 <= len(done) < RUNS
     if how == signal.SIGKILL:
         assert process.returncode == -how
         (folder / "rows" / "00").mkdir(exist_ok=True)
