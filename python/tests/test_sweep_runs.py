@@ -58,7 +58,7 @@ def swept(*words: Any, **more: Any) -> Sweep:
     return sweep(*words, **{"plots": False, **more})
 
 
-LONG: Tree = {**FLOCK, "time": {"fps": 10, "frames": 1200}}
+LONG: Tree = {**FLOCK, "time": {"fps": 10, "frames": 2400}}
 """The same, long enough for a sweep of it to be stopped on its way, however busy the machine is."""
 
 
@@ -376,11 +376,10 @@ def test_memory_that_is_too_little_for_a_worker_is_told(tmp_path: Path) -> None:
 # Stops
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
-def test_a_sweep_that_is_stopped_goes_on(
-    how: signal.Signals, long_reference: Sweep, tmp_path: Path, scene_file: SceneFile
-) -> None:
-    folder = tmp_path / "s"
+def stopped(
+    how: signal.Signals, folder: Path, scene_file: SceneFile
+) -> tuple[subprocess.Popen[str], str, dict[Path, int]]:
+    """A sweep that gets a signal after its first runs: what it said, and which rows it left, with their times."""
     words = ["sweep", str(scene_file(LONG)), "--no-plots", "--seeds", str(SEEDS), "--out", str(folder)]
     words += ["--vary", "system.0.vicsek.noise=0.5,2.0,4.0", "--vary", "particles.p.cloud.count=40,20"]
     words += [word for name in ORDER for word in ("--measure", name)]
@@ -394,7 +393,19 @@ def test_a_sweep_that_is_stopped_goes_on(
             os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)
             break
     _, err = process.communicate()
-    done = {path: path.stat().st_mtime_ns for path in folder.glob("rows/*/*.json")}
+    return process, err, {path: path.stat().st_mtime_ns for path in folder.glob("rows/*/*.json")}
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+def test_a_sweep_that_is_stopped_goes_on(
+    how: signal.Signals, long_reference: Sweep, tmp_path: Path, scene_file: SceneFile
+) -> None:
+    # On a busy machine all may be done before the signal arrives.
+    for attempt in range(4):
+        folder = tmp_path / f"s{attempt}"
+        process, err, done = stopped(how, folder, scene_file)
+        if len(done) < RUNS:
+            break
     assert 1 <= len(done) < RUNS
     if how == signal.SIGKILL:
         assert process.returncode == -how
