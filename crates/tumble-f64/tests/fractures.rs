@@ -187,6 +187,16 @@ fn a_bar_that_spins_breaks_in_its_middle_and_keeps_what_it_must() {
     assert!((a - b).norm() > 1.9, "{a:?} {b:?}");
 }
 
+/// Height of the lowest corner of all pieces [m], by what frames say.
+fn lowest(sim: &Simulation) -> f64 {
+    let topology = sim.topology();
+    let corners = topology.iter().filter(|c| c.object.starts_with("b.") && c.name == "vertices").flat_map(|c| {
+        let (x, q) = (column(sim, &c.object, "position")[0], turn(sim, &c.object));
+        numbers(&c.data).chunks(3).map(|p| (x + q.turn(Vector::from([p[0], p[1], p[2]]))).z).collect::<Vec<_>>()
+    });
+    corners.fold(f64::INFINITY, f64::min)
+}
+
 /// A box that falls on its corner and breaks.
 fn fall(strength: f64) -> Simulation {
     scene(
@@ -207,6 +217,7 @@ fn a_blow_breaks_weak_glue_and_makes_no_energy_itself() {
         assert!(energy(&sim) < last + 1e-3 * 240.0 * G, "frame {frame}: {} after {last} J", energy(&sim));
         let depth = sim.ledger().penetration.unwrap();
         assert!(depth < 0.02, "frame {frame}: {depth} m");
+        assert!(lowest(&sim) > -0.02, "frame {frame}: a corner at {} m", lowest(&sim));
         last = energy(&sim);
     }
     let ledger = sim.ledger();

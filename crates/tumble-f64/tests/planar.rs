@@ -83,6 +83,18 @@ fn blows_in_either_plane_keep_what_they_must() {
 }
 
 #[test]
+fn a_crooked_body_that_is_hit_takes_what_the_other_loses() {
+    let hull = "shape = { hull = { points = [[0, 0, 0], [0.4, 0.1, 0], [0, 0.3, 0.1], [0.1, -0.1, 0.5]] } }";
+    let ball = body("ball", "shape = { sphere = { radius = 0.1 } }\nposition = [[-0.6, 0, 0.1]]\nvelocity = [[3, 0, 0]]\nfriction = 0.3");
+    let mut sim = simulation(&text("xz", [0.0; 3], &(body("b", hull) + &ball)));
+    let (p, l, _) = kept(&sim);
+    run(&mut sim, 60);
+    let (q, m, _) = kept(&sim);
+    assert!(column(&sim, "b", "angular_velocity")[0].y.abs() > 0.1);
+    assert!((p - q).norm() < 1e-11 * p.norm() && (l - m).norm() < 1e-11 * p.norm(), "{p:?} {q:?} {l:?} {m:?}");
+}
+
+#[test]
 fn a_board_swings_on_its_joint_as_a_physical_pendulum() {
     // A board of 1 m on a pin 0.4 m above its centre: T = 2 pi sqrt((l²/12 + b²/12 + d²)/(g d)), at 1 degree.
     let a: f64 = 1f64.to_radians();
