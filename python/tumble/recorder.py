@@ -354,13 +354,16 @@ def ledger_row(
 
 
 def describe(units: Mapping[str, Mapping[str, str]], *tables: Columns) -> dict[str, dict[str, Any]]:
-    """Object -> column -> unit, shape and type. Where particles come and go, the first length is None."""
+    """Object -> column -> unit, shape and type. Where particles come and go, or a liquid's surface is another one in each
+    frame, the first length is None."""
     described: dict[str, dict[str, Any]] = {}
+    kept = tables[0]
     for place, columns in zip(("static", "frames"), tables, strict=True):
         for name, table in columns.items():
             for column, array in table.items():
                 unit = units.get(name, {}).get(column, "1")
-                varies = place == "frames" and "id" in table
+                anew = "triangles" in table and "triangles" not in kept.get(name, {})
+                varies = place == "frames" and ("id" in table or anew)
                 shape = (None, *array.shape[1:]) if varies else array.shape
                 entry = {"unit": unit, "shape": shape, "dtype": array.dtype.name, "in": place}
                 described.setdefault(name, {})[column] = entry

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tumble._engine import ExportError
 from tumble.bundled import unknown
-from tumble.columns import COLUMNS, GRIDS
+from tumble.columns import COLUMNS
 from tumble.folder import LEDGER
 from tumble.measures import OF_COLUMN
 
@@ -105,6 +105,8 @@ def stack(run: Stored, thing: str, column: str) -> Stack:
     _known(run, thing, [column])
     if "id" in run.columns[thing]:
         raise ExportError(f"{thing}: its particles come and go, so that no two frames have the same; use to_pandas")
+    if _made_anew(run, thing):
+        raise ExportError(f"{thing}: it is another mesh in each frame; read it frame by frame, or with to_pandas")
     return Stack(run, thing, column)
 
 
@@ -161,14 +163,16 @@ def to_pandas(run: Stored, thing: str | None = None, columns: Iterable[str] | No
 
 def to_xarray(run: Stored, things: Iterable[str] | None = None, columns: Iterable[str] | None = None) -> Any:
     """An xarray.Dataset of the ledger (`energy`) and of the columns of objects (`rope.position`) over time, all of those named
-    or all there are, with units and meanings in `attrs`. Particles that come and go have a coordinate `NAME.id`, and nan in
+    or all but surfaces of liquids, which are other meshes in each frame, with units and meanings in `attrs`. Particles that come and go have a coordinate `NAME.id`, and nan in
     frames in which they do not live. Raises ExportError."""
     xarray = library("xarray", "to_xarray")
     there = {name: _in_frames(run, name) for name in run.columns if _in_frames(run, name)}
-    wanted = list(there) if things is None else list(things)
+    wanted = [name for name in there if not _made_anew(run, name)] if things is None else list(things)
     for name in wanted:
         if name not in there:
             raise ExportError(unknown("object", name, there))
+        if _made_anew(run, name):
+            raise ExportError(f"{name}: it is another mesh in each frame; read it frame by frame, or with to_pandas")
     chosen = None if columns is None else list(columns)
     for name in chosen or ():
         if not any(name in there[thing] for thing in wanted):
@@ -211,6 +215,13 @@ def library(name: str, what: str) -> ModuleType:
         raise ExportError(f"{what} needs {name}: {_EXTRA}") from None
 
 
+def _made_anew(run: Stored, thing: str) -> bool:
+    """Whether an object has other elements in each frame, without numbers that they keep: the surface of a liquid."""
+    return "id" not in run.columns[thing] and any(
+        about["in"] == "frames" and list(about["shape"][:1]) == [None] for about in run.columns[thing].values()
+    )
+
+
 def _in_frames(run: Stored, thing: str) -> list[str]:
     return [name for name, about in run.columns.get(thing, {}).items() if about["in"] == "frames"]
 
@@ -229,7 +240,7 @@ def _unit_of_books(column: str) -> str:
 
 
 def _on_grid(run: Stored, thing: str) -> bool:
-    return any(one["name"] == thing for kind in GRIDS for one in run.scene.get(kind, ()))
+    return "grid_cells" in run.columns[thing]
 
 
 def _rank(run: Stored, thing: str, column: str) -> int:

@@ -167,7 +167,7 @@ fn gains(shape: Shape, reach: f64, state: BodyState) -> [[Vector; 2]; 3] {
     solids.place(0.0);
     let lattice = grid.lattice();
     let mut solver = Solver::new(lattice, [[Default::default(); 2]; 3], solids.open.each_ref().map(Vec::as_slice), None).unwrap();
-    solver.join(solids.joints(FLUID));
+    solver.join(solids.joints(FLUID, |_| true));
     let random = Random::new(5, "velocity");
     let mut u = Vectors::faces(grid, "m/s").unwrap();
     for part in &mut u.parts {

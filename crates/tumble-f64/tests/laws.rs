@@ -30,6 +30,8 @@ mod immersed;
 mod integrators_order;
 mod integrators_oscillator;
 mod liquid;
+mod liquid_bodies;
+mod liquid_flow;
 mod neighbours;
 mod operators;
 mod pressure;

@@ -189,8 +189,8 @@ fn a_second_solve_keeps_the_volume_of_what_splashes() {
     };
     let (kept, lost) = (change(""), change("keep_volume = false"));
     println!("kept to {kept:.4}, lost {lost:.4}");
-    // Measured: -0.033 and -0.109, of so few cells.
-    assert!(kept.abs() < 0.04 && lost < -0.08, "{kept} {lost}");
+    // Of so few cells; with 128 along the tank it is 0.5 %.
+    assert!(kept.abs() < 0.025 && lost < -0.06, "{kept} {lost}");
 }
 
 #[test]
@@ -201,7 +201,7 @@ fn a_disc_that_turns_keeps_its_angular_momentum_by_affine_transfers() {
         let fill = "{ shape.sphere.radius = 0.15, velocity = [\"z\", 0, \"-x\"] }";
         let mut sim = simulation(&format!(
             "dimension = 2\nworld.gravity = [0, 0, 0]\ntime.fps = {fps}\n[[liquid]]\nname = \"water\"\ntransfer = \"{transfer}\"\n\
-             box = {{ size = [2, 1, 2], resolution = 256 }}\nfill = [{fill}]\n"
+             box = {{ size = [1, 1, 1], resolution = 128 }}\nfill = [{fill}]\n"
         ));
         let start = sim.ledger();
         run(&mut sim, 20);

@@ -95,6 +95,13 @@ pub const COLUMNS: &[Described] = &[
         ..CELLS
     },
     Described { name: "vorticity", unit: "1/s", doc: "Curl of the velocity: in a plane the component across it, in space three.", ..CELLS },
+    Described {
+        name: "distance",
+        unit: "m",
+        doc: "Distance from the surface of a liquid, below zero in it, in cells of an object `NAME.cells`, which then have `velocity`, too; 1.5 \
+              cells where it is farther.",
+        ..CELLS
+    },
     Described { name: "divergence", unit: "1/s", doc: "Divergence of the velocity.", ..CELLS },
     Described { name: "velocity_x", unit: "m/s", doc: "Velocity along x, on the faces across x.", places: &[Place::Face], ..CELLS },
     Described { name: "velocity_y", unit: "m/s", doc: "Velocity along y, on the faces across y.", places: &[Place::Face], ..CELLS },

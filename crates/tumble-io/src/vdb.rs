@@ -16,14 +16,16 @@ pub enum Class {
     Unknown,
     /// A density of smoke.
     Fog,
+    /// Distances from a surface, below zero inside.
+    LevelSet,
     /// Vectors whose components lie on the lower faces of the voxels.
     Staggered,
 }
 
 impl Class {
-    /// The class of that name: `unknown`, `fog volume` or `staggered`.
+    /// The class of that name: `unknown`, `fog volume`, `level set` or `staggered`.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Unknown, Self::Fog, Self::Staggered].into_iter().find(|c| c.name() == name)
+        [Self::Unknown, Self::Fog, Self::LevelSet, Self::Staggered].into_iter().find(|c| c.name() == name)
     }
 
     /// Its name in the file.
@@ -31,6 +33,7 @@ impl Class {
         match self {
             Self::Unknown => "unknown",
             Self::Fog => "fog volume",
+            Self::LevelSet => "level set",
             Self::Staggered => "staggered",
         }
     }

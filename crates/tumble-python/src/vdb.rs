@@ -24,7 +24,7 @@ struct Given<'py> {
     half: bool,
 }
 
-/// The bytes of a VDB file. Each volume is a dict: name, unit, class ("unknown", "fog volume" or "staggered"), values (float32,
+/// The bytes of a VDB file. Each volume is a dict: name, unit, class ("unknown", "fog volume", "level set" or "staggered"), values (float32,
 /// x fastest, those of a vector together), width, points, corner, spacing [m], origin [m], background, tolerance, half.
 /// Raises ExportError.
 #[pyfunction]

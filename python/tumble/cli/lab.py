@@ -29,6 +29,7 @@ def lab() -> None:
       tumble lab positions
       tumble lab fabric denim
       tumble lab contact
+      tumble lab dam
     """
 
 
@@ -214,3 +215,24 @@ def contact(
         written, text = page(out or find.OUT / "lab" / "contact", case or (), progress=progress)
     say(written)
     say(text)
+
+
+@app.command(cls=Verb)
+def dam(
+    cells: Annotated[int, typer.Option(metavar="N", min=16, max=512, help="Cells along the tank.")] = 64,
+    out: OutOption = None,
+) -> None:
+    """Break the same dam by every method for liquids: pictures, front against the experiment, energy, volume, cost.
+
+    PIC, FLIP and APIC, which are particles and a grid, and position-based particles by themselves. It takes about half a minute.
+
+    \b
+    Examples:
+      tumble lab dam
+      tumble lab dam --cells 96
+    """
+    from tumble.lab.dam import page
+
+    with Progress("lab") as progress:
+        written = page(out or find.OUT / "lab" / "dam", cells, progress)
+    say(written)

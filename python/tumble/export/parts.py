@@ -163,6 +163,8 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
             inner = where + path(title).removeprefix(ROOT)
             made.append(Part(thing, where, thing.name, "PointInstancer", grows=grows))
             made.append(Part(mesh, inner, title, "Mesh", cut=edges))
+        elif thing.form == "liquid":
+            made.append(Part(thing, path(thing.name), thing.name, "Mesh"))
         elif len(thing.triangles):
             kind, words = kinds.get(thing.name, ("", {}))
             cut = None if thing.form == "surface" else split(places(thing, start), thing.triangles)
@@ -230,7 +232,8 @@ def velocities(part: Part, now: Now) -> npt.NDArray[np.float64] | None:
     own = now.columns.get(name, {}).get("velocity")
     if own is not None:
         return np.asarray(own, dtype=float).reshape(-1, 3)
-    if part.body is not None or varying(part, now.columns) or np.isfinite(part.thing.leap):
+    other = varying(part, now.columns) or part.thing.form == "liquid"
+    if part.body is not None or other or np.isfinite(part.thing.leap):
         return None
     if now.before is None and now.after is None:
         return None
@@ -379,6 +382,8 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
     if part.kind == "Mesh":
         changed = torn(columns, part.thing)
         if changed is not None:
+            if part.thing.form == "liquid":
+                yield "faceVertexCounts", "int[]", np.full(len(changed), 3, dtype=np.int32)
             yield "faceVertexIndices", "int[]", np.ascontiguousarray(changed.ravel(), dtype=np.int32)
         source, triangles = part.cut or (np.arange(len(x)), part.thing.triangles if changed is None else changed)
         n = normals(x[source], triangles)

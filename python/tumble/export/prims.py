@@ -101,7 +101,8 @@ def _constant(prim: Any, part: Part, start: Now) -> None:
 
     n = len(prim.GetAttribute("points").Get())
     every = UsdGeom.PrimvarsAPI(prim)
-    if part.kind in ("Mesh", "BasisCurves") and deforms(part, start.columns) and not part.trail:
+    stays = not part.trail and part.thing.form != "liquid"
+    if part.kind in ("Mesh", "BasisCurves") and deforms(part, start.columns) and stays:
         rest = every.CreatePrimvar("rest", Sdf.ValueTypeNames.Point3fArray, UsdGeom.Tokens.vertex)
         rest.Set(prim.GetAttribute("points").Get())
     if part.kind == "Points" and varying(part, start.columns):
@@ -156,8 +157,9 @@ def _mesh(prim: Any, part: Part) -> None:
     mesh = UsdGeom.Mesh(prim)
     flat = corners(part, part.thing.triangles).astype(np.int32)
     sides = 3 if part.squares is None else 4
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(flat) // sides, sides))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(flat)))
+    if part.thing.form != "liquid":
+        mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(flat) // sides, sides))
+        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(flat)))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.faceVarying if part.cut else UsdGeom.Tokens.vertex)
     mesh.CreateDoubleSidedAttr(part.thing.form == "surface")
@@ -201,13 +203,16 @@ def _bind(stage: Any, prim: Any, part: Part, start: Now, night: bool) -> None:
             out = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
             paint.ConnectToSource(reader.ConnectableAPI(), out.GetBaseName())
     shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness(part))
+    if part.thing.form == "liquid":
+        shader.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.33)
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(0.15)
     look.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
     UsdShade.MaterialBindingAPI.Apply(prim).Bind(look)
 
 
 def roughness(part: Part) -> float:
-    """Of its material: cloth is rougher than all else."""
-    return 0.8 if part.thing.form == "surface" else 0.4
+    """Of its material: cloth is rougher than all else, liquids are smooth."""
+    return {"surface": 0.8, "liquid": 0.02}.get(part.thing.form, 0.4)
 
 
 def _volume(stage: Any, part: Part, stem: str, run: Recording, table: Mapping[str, Any]) -> None:

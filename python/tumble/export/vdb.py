@@ -5,7 +5,8 @@ In each file a grid for each column, under its name: `density` (a fog volume), `
 as a staggered grid. Voxel 0, 0, 0 is the first cell; its middle and the size of the voxels are those of the cell, in
 metres. A plane is one voxel thick. Single precision, or half.
 
-Only what differs from the background is stored: from zero, of temperatures from their median.
+Only what differs from the background is stored: from zero, of temperatures from their median, of the distance from the
+surface of a liquid (a level set) from the farthest.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,6 +26,10 @@ from tumble.pictures.things import Recording
 
 TOLERANCE = 1e-4
 """Smallest stored difference from the background, relative to the largest of the frame."""
+
+
+LEVEL = "distance"
+"""The column that is a level set."""
 
 
 def write(
@@ -59,9 +64,14 @@ def write(
 
 
 def grids(run: Recording) -> dict[str, Box]:
-    """The grids of objects that lie on one."""
+    """The grids of objects that have columns on one."""
     found = {name: box(table) for name, table in run.static.items()}
-    return {name: grid for name, grid in found.items() if grid is not None}
+    first = run.frame(0) if run.n_frames else {}
+    return {
+        name: grid
+        for name, grid in found.items()
+        if grid is not None and (first.get(name) or any(look.object == name for look in run.looks.objects))
+    }
 
 
 def paths(run: Recording) -> dict[str, str]:
@@ -84,7 +94,7 @@ def encode(
     """The file of an object in a frame. Raises ExportError."""
     volumes = []
     for name, array in columns(grid, table):
-        what = "fog volume" if name in FOG else "unknown"
+        what = "fog volume" if name in FOG else "level set" if name == LEVEL else "unknown"
         volumes.append(_volume(grid, name, array, what, half, tolerance))
     staggered = faces(grid, table)
     if staggered is not None:
@@ -103,7 +113,11 @@ def fields(grid: Box, table: Mapping[str, npt.NDArray[Any]]) -> dict[str, int]:
 
 def _volume(grid: Box, name: str, array: npt.NDArray[Any], what: str, half: bool, tolerance: float) -> dict[str, Any]:
     values = np.ascontiguousarray(np.moveaxis(array, (0, 2), (2, 0)), dtype=np.float32)
-    background = np.float32(np.median(values)) if name == "temperature" else np.float32(0)
+    background = np.float32(0)
+    if name == "temperature":
+        background = np.float32(np.median(values))
+    elif name == LEVEL:
+        background = np.float32(values.max(initial=0.0))
     with np.errstate(invalid="ignore"):
         off = np.abs(values - background)
     most = float(off[np.isfinite(off)].max(initial=0.0))

@@ -2,6 +2,7 @@
 the picture, smoke and images that `volumes` paints. They know nothing of scenes; `things` makes them of a run."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,10 @@ THIN = 0.8
 """Pixels that fabric is thick, at least."""
 
 
+Matter = Literal["plain", "fabric", "liquid"]
+"""What light meets. The colour of a liquid is that of the light that comes through."""
+
+
 @dataclass(frozen=True)
 class Mesh:
     """A surface of triangles, seen from both sides."""
@@ -28,7 +33,7 @@ class Mesh:
     triangles: Indices
     normals: Floats
     color: Rgb
-    fabric: bool = False
+    matter: Matter = "plain"
     thickness: float = 0.0
     """Of fabric; half of it on either side."""
     closed: bool = False
@@ -148,7 +153,7 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
 
 def finished(thing: Mesh, pixel: float) -> Mesh:
     """Fabric, round to the size of a pixel and with its thickness; any other mesh as it is."""
-    if not thing.fabric or not len(thing.triangles):
+    if thing.matter != "fabric" or not len(thing.triangles):
         return thing
     x, triangles = thing.vertices, thing.triangles
     corners = x[triangles]

@@ -50,7 +50,7 @@ def draw(things: list[Thing], camera: Camera) -> npt.NDArray[np.uint8]:
     bodies = [t for t in things if isinstance(t, Body)]
     shaded = [_shaded(t, camera) for t in bodies]
     if shaded:
-        behind = [BEHIND * camera.width if isinstance(t, Mesh) and not t.fabric else 0.0 for t in bodies]
+        behind = [BEHIND * camera.width if isinstance(t, Mesh) and t.matter != "fabric" else 0.0 for t in bodies]
         later = np.concatenate([np.full(len(s[1]), b) for s, b in zip(shaded, behind, strict=True)])
         _paint(axes, camera, *joined(shaded), later)
     canvas.draw()
@@ -91,7 +91,7 @@ def _shaded(thing: Body, camera: Camera) -> tuple[Floats, Indices, Floats]:
     key, rim, fill = key_light(camera), unit(right + 0.55 * forward + 0.4 * up), unit(0.2 * up - forward)
     lit = 0.36 + 0.62 * _facing(normals, key) + 0.25 * _facing(normals, rim) + 0.25 * _facing(normals, fill)
     color = display(np.array(thing.color)) * lit[:, None]
-    if not (isinstance(thing, Mesh) and thing.fabric):
+    if not (isinstance(thing, Mesh) and thing.matter == "fabric"):
         gloss = _facing(normals, unit(key - sight)) ** 40
         color = color + 0.3 * gloss[:, None]
     return vertices, triangles, np.clip(color, 0.0, 1.0)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, finished
+from tumble.pictures.drawn import Body, Ground, Matter, Mesh, Smoke, Spheres, Thing, Tubes, finished
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.strands import Hair
@@ -40,6 +40,7 @@ KEY_SIZE = 0.2
 
 KEY_DISTANCE = 1000.0
 
+WATERY = {"type": "path", "max_depth": 16, "rr_depth": 8, "hide_emitters": True}
 PATHS = {"type": "path", "max_depth": 5, "hide_emitters": True}
 THROUGH_SMOKE = {"type": "volpath", "max_depth": 24, "rr_depth": 12, "hide_emitters": True}
 COLORS = {"type": "path", "max_depth": 1}
@@ -49,8 +50,8 @@ MIRROR = 16
 
 Picture = npt.NDArray[np.uint8]
 
-Look = Callable[[Rgb, bool], dict[str, Any]]
-"""What shapes of a colour, of fabric or not, are made with."""
+Look = Callable[[Rgb, Matter], dict[str, Any]]
+"""What shapes of a colour and a matter are made with."""
 
 
 def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
@@ -66,7 +67,9 @@ def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
     with tempfile.TemporaryDirectory() as folder:
         shapes = _shapes(mi, bodies, Path(folder), _matter)
         smoke = {f"smoke {k}": _smoke(mi, t) for k, t in enumerate(things) if isinstance(t, Smoke)}
-        light = _render(mi, _studio(mi, camera, samples, THROUGH_SMOKE if smoke else PATHS) | shapes | floors | smoke)
+        watery = any(isinstance(t, Mesh) and t.matter == "liquid" for t in bodies)
+        integrator = THROUGH_SMOKE if smoke else WATERY if watery else PATHS
+        light = _render(mi, _studio(mi, camera, samples, integrator) | shapes | floors | smoke)
         glowing = _shapes(mi, bodies, Path(folder), _glowing)
         colors = _render(mi, _sight(mi, camera, samples, COLORS) | glowing)
     sky = background(camera.size)
@@ -181,7 +184,7 @@ def _seen(thing: Mesh, camera: Camera) -> Mesh:
     """A mesh as fine as its picture, without normals that contradict what is seen."""
     if not camera.parallel:  # Seen head-on, in a plane, cloth is a line.
         thing = finished(thing, camera.pixel)
-    if not len(thing.triangles):
+    if not len(thing.triangles) or thing.matter == "liquid":
         return thing
     x, triangles, n = turned(thing.vertices, thing.triangles, thing.normals, camera.eye)
     return replace(thing, vertices=x, triangles=triangles, normals=n)
@@ -199,7 +202,7 @@ def _shapes(mi: Any, bodies: list[Body], folder: Path, look: Look) -> dict[str, 
             found = _hair(thing, folder / f"{k}", look)
         elif isinstance(thing, Mesh) and len(thing.triangles):
             surface = thing.vertices, thing.triangles, thing.normals
-            found = {"": _mesh(mi, *surface, look(thing.color, thing.fabric))}
+            found = {"": _mesh(mi, *surface, look(thing.color, thing.matter))}
         shapes |= {f"{k} {name}": shape for name, shape in found.items()}
     return shapes
 
@@ -225,7 +228,7 @@ def _smoke(mi: Any, thing: Smoke) -> dict[str, Any]:
 
 
 def _spheres(mi: Any, thing: Spheres, look: Look) -> dict[str, Any]:
-    made = look(thing.color, False)
+    made = look(thing.color, "plain")
     if len(thing.centers) > MANY:
         return {"": _mesh(mi, *balls(thing.centers, thing.radii, 1), made)}
     pairs = zip(thing.centers.tolist(), thing.radii.tolist(), strict=True)
@@ -239,7 +242,7 @@ def _tubes(thing: Tubes, file: Path, look: Look) -> dict[str, Any]:
         return {}
     rows = ("\n".join(f"{x:.9g} {y:.9g} {z:.9g} {thing.radius:.9g}" for x, y, z in c.tolist()) for c in curves)
     file.write_text("\n\n".join(rows) + "\n")
-    made = look(thing.color, False)
+    made = look(thing.color, "plain")
     parts: dict[str, Any] = {"": {"type": "linearcurve", "filename": str(file), **made}}
     if len(curves) <= FEW:
         ends = [p for c in curves for p in (c[0].tolist(), c[-1].tolist())]
@@ -260,7 +263,7 @@ def _hair(thing: Hair, stem: Path, look: Look) -> dict[str, Any]:
         file = stem.with_name(f"{stem.name}-{j}.txt")
         file.write_text("".join(line % tuple(strand) for strand in rows.reshape(len(rows), -1).tolist()))
         r, g, b = thing.color
-        made = look((r * shade, g * shade, b * shade), False)
+        made = look((r * shade, g * shade, b * shade), "plain")
         parts[f"{j}"] = {"type": "linearcurve", "filename": str(file), **made}
     return parts
 
@@ -329,12 +332,16 @@ def _mesh(mi: Any, vertices: Floats, triangles: Indices, normals: Floats, look: 
     return mesh
 
 
-def _matter(color: Rgb, fabric: bool) -> dict[str, Any]:
+def _matter(color: Rgb, matter: Matter) -> dict[str, Any]:
     """What scatters light: one for all shapes of a thing."""
     import mitsuba as mi
 
     base = {"type": "rgb", "value": np.clip(color, 0.0, 0.95).tolist()}
-    if fabric:
+    if matter == "liquid":
+        # Light crosses the surface twice.
+        through = {"type": "rgb", "value": np.sqrt(np.clip(color, 0.0, 1.0)).tolist()}
+        return {"bsdf": mi.load_dict({"type": "dielectric", "int_ior": 1.33, "specular_transmittance": through})}
+    if matter == "fabric":
         look = {"roughness": 0.85, "specular": 0.25, "sheen": 0.6, "sheen_tint": 0.6}
     else:
         look = {"roughness": 0.35, "specular": 0.5}
@@ -342,6 +349,6 @@ def _matter(color: Rgb, fabric: bool) -> dict[str, Any]:
     return {"bsdf": mi.load_dict({"type": "twosided", "bsdf": bsdf})}
 
 
-def _glowing(color: Rgb, fabric: bool) -> dict[str, Any]:
+def _glowing(color: Rgb, matter: Matter) -> dict[str, Any]:
     """What is seen in its colour without any light: one for each shape."""
     return {"emitter": {"type": "area", "radiance": {"type": "rgb", "value": np.clip(color, 0.0, 1.0).tolist()}}}

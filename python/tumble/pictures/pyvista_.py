@@ -42,7 +42,7 @@ def draw(things: list[Thing], camera: Camera) -> npt.NDArray[np.uint8]:
                 continue
             surface = _poly(pv, vertices, triangles)
             surface.point_data.active_normals = normals
-            gloss = 0.0 if isinstance(thing, Mesh) and thing.fabric else 0.35
+            gloss = 0.0 if isinstance(thing, Mesh) and thing.matter == "fabric" else 0.35
             color = display(np.array(thing.color)).tolist()
             actor = plotter.add_mesh(surface, color=color, ambient=0.36, diffuse=0.8, specular=gloss, specular_power=40)
             actor.prop.interpolation = "Phong"

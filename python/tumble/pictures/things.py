@@ -19,7 +19,7 @@ from tumble.columns import FOG, SIGNED
 from tumble.grids import Box
 from tumble.looks import CELLS, DRAWN_ON, GLOWING, MAPS, MASSES, SHADE, SHOWN, SOLID, SPRING, TRAIL, Looks
 from tumble.pictures.blackbody import developed, glow
-from tumble.pictures.drawn import Cloud, Ground, Image, Mesh, Smoke, Spheres, Thing, Tubes
+from tumble.pictures.drawn import Cloud, Ground, Image, Matter, Mesh, Smoke, Spheres, Thing, Tubes
 from tumble.pictures.strands import Skin, Strands, strands
 from tumble.pictures.surfaces import Floats, Indices, normals, outward, placed, split
 from tumble.style import Rgb, linear
@@ -229,7 +229,8 @@ def turns(columns: Columns, thing: Object) -> Floats:
 
 
 def torn(columns: Columns, thing: Object) -> Indices | None:
-    """Triangles of a surface that tears as they are in a frame, m x 3; None for any other, whose triangles stay."""
+    """Triangles of a surface that tears, or of a liquid's, as they are in a frame, m x 3; None for any other, whose
+    triangles stay."""
     column = columns.get(thing.name, {}).get("triangles")
     return None if column is None else np.asarray(column, dtype=np.int64).reshape(-1, 3)
 
@@ -477,6 +478,10 @@ class Stage:
         x = positions(columns, thing)
         if thing.vertices is not None:
             return [self._instances(thing, thing.vertices, x, turns(columns, thing))]
+        if thing.form == "liquid":
+            now = torn(columns, thing)
+            triangles = now if now is not None else thing.triangles
+            return [Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, "liquid", closed=True)]
         broken = self._broken(thing, columns)
         if thing.strands is not None:
             curves = hair(thing, self.objects, columns)
@@ -506,8 +511,9 @@ class Stage:
             source, triangles = self._cuts[thing.name]
             x = x[source]
         closed = whole and thing.name in self._closed
-        fabric, thick = thing.form == "surface", _thickness(self.run.scene, thing.name)
-        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, fabric, thick, closed)
+        matter: Matter = "fabric" if thing.form == "surface" else "plain"
+        thick = _thickness(self.run.scene, thing.name)
+        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, matter, thick, closed)
 
     def _instances(self, thing: Object, vertices: Floats, x: Floats, turn: Floats) -> Mesh:
         """All bodies of an object."""

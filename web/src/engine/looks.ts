@@ -18,6 +18,8 @@ export const MATTER = {
   solid: "solid",
   /** The edges of a solid that has others inside. */
   container: "solid",
+  /** Triangles around a liquid, others in each frame, seen through. */
+  liquid: "masses",
   /** A plane that fades away. */
   ground: "solid",
   /** A column of cells in a plane, and a line around it. */
@@ -59,4 +61,4 @@ export const DRAWN_ON = 0.35;
 export const FOG: string[] = ["density", "fuel"];
 
 /** Numbers on cells that are shown around zero. */
-export const SIGNED: string[] = ["pressure", "vorticity", "divergence"];
+export const SIGNED: string[] = ["pressure", "vorticity", "distance", "divergence"];

@@ -161,6 +161,35 @@ export class Pieces implements Layer {
   }
 }
 
+/** The surface of a liquid: other triangles in each frame, shiny, and seen through. */
+export class Water implements Layer {
+  readonly object: THREE.Mesh;
+  private readonly material = new THREE.MeshPhysicalMaterial({
+    roughness: 0.08,
+    clearcoat: 1,
+    transparent: true,
+    opacity: 0.72,
+    side: THREE.DoubleSide,
+  });
+
+  constructor(color: Rgb) {
+    this.material.color.setRGB(...color, THREE.LinearSRGBColorSpace);
+    this.object = new THREE.Mesh(new THREE.BufferGeometry(), this.material);
+    this.object.receiveShadow = true;
+    this.object.frustumCulled = false;
+  }
+
+  set(position: Numbers, triangles: Numbers): void {
+    this.object.geometry.dispose();
+    this.object.geometry = triangulated(position, triangles);
+    this.object.geometry.computeVertexNormals();
+  }
+
+  dispose(): void {
+    release(this.object);
+  }
+}
+
 /** Edges that bend more than this are drawn sharp on solids [rad]. */
 const SHARP = 0.6;
 

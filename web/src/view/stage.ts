@@ -6,7 +6,7 @@ import type { Column, Form, Frame, Numbers, SceneInfo, Sight, Vector } from "../
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { Depths } from "./depths";
 import { Instances } from "./instances";
-import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
+import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars, Water } from "./layers";
 import { LOOK, type Look } from "./look";
 import { along, arrows, carry, ground, outline, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
@@ -241,6 +241,8 @@ export class Stage {
         if (trail > 0) this.add((thing.way = new Pieces(TRAIL * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
       } else if (isLine(form)) {
         thing.body = new Pieces(radius, { thinnest: 1.5 });
+      } else if (form === "liquid") {
+        thing.body = new Water(color);
       } else if (form === "ground") {
         this.scene.add((thing.plane = ground()));
       }
@@ -620,6 +622,8 @@ export class Stage {
     if (thing.body instanceof Instances) {
       thing.body.set(columns);
       thing.body.paint(colors);
+    } else if (thing.body instanceof Water) {
+      thing.body.set(x, columns.triangles.data);
     } else if (isSkin(thing.form)) {
       if (!thing.body) {
         thing.body = new Surface(x, thing.topology.triangles.data, thing.color, {
@@ -677,7 +681,8 @@ export class Stage {
     let depth = Infinity;
     let found: { object: string; row: number; point: THREE.Vector3; mass: number } | null = null;
     for (const thing of this.things) {
-      if (MATTER[thing.form] !== "masses" || this.look.hidden.includes(thing.name)) continue;
+      // The surface of a liquid is no mass that a hand could hold.
+      if (MATTER[thing.form] !== "masses" || thing.body instanceof Water || this.look.hidden.includes(thing.name)) continue;
       const x = this.frame.columns[thing.name]?.position?.data;
       if (!x) continue;
       const masses = thing.topology.mass?.data;

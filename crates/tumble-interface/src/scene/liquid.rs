@@ -1,12 +1,11 @@
 //! Liquids with a free surface on a grid.
 
-use super::{AnimatedVector, GridBox, OnFailure, Shape};
+use super::{AnimatedVector, GridBox, OnFailure, Shape, Solid};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An incompressible liquid with a free surface in a box of cells: particles carry it, a grid finds its pressure. The sides of the box are walls along
-/// which it slips, as it does along colliders; it has no viscosity, no surface tension, and does not move what it meets. Its rows in frames are its
-/// particles.
+/// An incompressible liquid with a free surface in a box of cells: particles carry it, a grid finds its pressure. The sides of the box are walls. Its
+/// rows in frames are its particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Liquid {
@@ -18,12 +17,34 @@ pub struct Liquid {
     /// The cells.
     #[serde(rename = "box")]
     pub cells: GridBox,
-    /// What it fills at the start. Where fills overlap, the first counts.
+    /// What it fills at the start. Where fills overlap, the first counts. Needed where there is no `inflow`.
+    #[serde(default)]
     pub fill: Vec<LiquidFill>,
+    /// Where it comes in: volumes that stay full, such as the mouth of a tap.
+    #[serde(default)]
+    pub inflow: Vec<LiquidInflow>,
+    /// Where it leaves: volumes that stay empty.
+    #[serde(default)]
+    pub drain: Vec<LiquidDrain>,
     /// Density.
     #[serde(default = "water")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub density: f64,
+    /// Dynamic viscosity: 1e-3 for water, 0.1 for oil, 2 to 10 for honey; 0 for none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "Pa s"))]
+    pub viscosity: f64,
+    /// Surface tension: 0.072 for water, 0 for none.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
+    pub surface_tension: f64,
+    /// What it does along colliders and the sides of its box; with `no_slip` it needs viscosity.
+    #[serde(default)]
+    pub solids: Solid,
+    /// Objects that it moves, and that move it: [[body]], by force and torque of its pressure; [[particles]] in a system of dynamics, whose masses are
+    /// balls of their radius (in 2D: disks, a metre thick).
+    #[serde(default)]
+    pub bodies: Vec<String>,
     /// Particles along each edge of a cell at the start: 2 are 8 in a cell, 4 in the plane.
     #[serde(default = "two")]
     #[schemars(range(min = 1, max = 4))]
@@ -46,6 +67,10 @@ pub struct Liquid {
     #[serde(default = "one")]
     #[schemars(range(max = 4.0), extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub courant: f64,
+    /// Whether frames have its surface as well, an object `NAME.surface` with triangles of its own in each, which pictures and files show instead of
+    /// particles. Default: true, false in the plane, where there is none.
+    #[serde(default)]
+    pub surface: Option<bool>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB). Default: from dark to light with the speed.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -72,7 +97,7 @@ fn one() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LiquidFill {
-    /// Its shape; not a mesh. What lies outside the box or in a collider stays empty.
+    /// Its shape; a mesh must be closed. What lies outside the box or in a collider stays empty.
     pub shape: Shape,
     /// Velocity at the start; may be a formula of x, y, z.
     #[serde(default = "still")]
@@ -82,6 +107,41 @@ pub struct LiquidFill {
 
 fn still() -> AnimatedVector {
     [0.0; 3].into()
+}
+
+/// A volume in which a liquid comes in: it stays full, and what is in it has the velocity of the inflow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LiquidInflow {
+    /// Its shape; not a mesh.
+    pub shape: Shape,
+    /// Velocity; may change in time.
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: AnimatedVector,
+    /// Start time.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub start: f64,
+    /// End time. Default: never.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub end: Option<f64>,
+}
+
+/// A volume in which a liquid leaves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LiquidDrain {
+    /// Its shape; not a mesh.
+    pub shape: Shape,
+    /// Start time.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub start: f64,
+    /// End time. Default: never.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s"))]
+    pub end: Option<f64>,
 }
 
 /// How velocities go from particles to the grid and back.

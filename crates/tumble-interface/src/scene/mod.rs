@@ -42,7 +42,7 @@ pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use joints::{Joint, JointKind, JointMotor};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
-pub use liquid::{Liquid, LiquidFill, LiquidPressure, LiquidTransfer};
+pub use liquid::{Liquid, LiquidDrain, LiquidFill, LiquidInflow, LiquidPressure, LiquidTransfer};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use rigid::{Arrange, BirthRegion, Body, BodyEmit, BodyPart, BodyShape, Fracture, Rigid};
@@ -363,6 +363,13 @@ impl Scene {
                 }
             }
             all.extend(emit.as_mut().and_then(|emit| emit.from.mesh_mut(&format!("grains \"{name}\".emit.from"))));
+        }
+        for Liquid { name, fill, .. } in &mut self.liquid {
+            for (k, fill) in fill.iter_mut().enumerate() {
+                if let Shape::Mesh(mesh) = &mut fill.shape {
+                    all.push(one(format!("liquid \"{name}\".fill[{k}].shape.mesh"), mesh));
+                }
+            }
         }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);

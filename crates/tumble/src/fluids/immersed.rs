@@ -259,13 +259,23 @@ impl Immersed {
         });
     }
 
-    /// Its part of the matrix of the pressure; `mass` is that of the fluid in a cell [kg].
-    pub(super) fn joint(&self, mass: f64) -> Joint {
-        Joint::new(self.cells.clone(), self.response.map(|row| row.map(|w| mass * w)))
+    /// Its part of the matrix of the pressure of the cells that `has` says; `mass` is that of the fluid in a cell [kg].
+    pub(super) fn joint(&self, mass: f64, has: &impl Fn(u32) -> bool) -> Joint {
+        Joint::new(self.cells.iter().filter(|(cell, _)| has(*cell)).copied().collect(), self.response.map(|row| row.map(|w| mass * w)))
+    }
+
+    /// The sum of what cells that `has` says have, by the rows of J.
+    pub(super) fn sum(&self, of: impl Fn(u32) -> f64, has: &impl Fn(u32) -> bool) -> Directions {
+        let mut sums = Directions::default();
+        for (cell, entries) in self.cells.iter().filter(|(cell, _)| has(*cell)) {
+            let value = of(*cell);
+            sums.iter_mut().zip(entries).for_each(|(sum, entry)| *sum += f64::from(*entry) * value);
+        }
+        sums
     }
 
     /// Takes the impulse of a pressure, from J q [m²/s]; `mass` is rho dx^(d-1) [kg/m].
-    pub(super) fn yield_to(&mut self, product: &Directions, mass: f64) {
+    pub fn yield_to(&mut self, product: &Directions, mass: f64) {
         if self.state.inverse_mass > 0.0 {
             self.push(product.map(|part| part * mass));
         }

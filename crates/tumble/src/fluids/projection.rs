@@ -187,7 +187,7 @@ impl PressureProjection<'_> {
             let weights = weights(light, solids.as_deref().map(|solids| &solids.open), pressure.data.len());
             let sides = sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
             let mut varying = Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)?;
-            varying.join(solids.as_deref().map_or(Vec::new(), |solids| solids.joints(density)));
+            varying.join(solids.as_deref().map_or(Vec::new(), |solids| solids.joints(density, |_| true)));
             varying.spare = std::mem::take(&mut solver.spare);
             Ok(varying)
         });

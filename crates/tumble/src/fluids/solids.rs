@@ -22,6 +22,7 @@ use crate::math::parallel::Tasks;
 use crate::operators::Spot;
 use crate::state::{Field, Grid, Place, Vectors};
 use std::sync::Arc;
+use tumble_interface::Column;
 
 /// Nodes along the edges of a block that one distance may settle.
 const BLOCK: usize = 8;
@@ -303,10 +304,10 @@ impl Solids {
         (self.cuts, self.closed, self.ghosts) = (cuts, closed, ghosts);
     }
 
-    /// Contribution of bodies to the pressure matrix; `density` is that of the fluid [kg/m³].
-    pub fn joints(&self, density: f64) -> Vec<Joint> {
+    /// Contribution of bodies to the pressure matrix of the cells that `has` says; `density` is that of the fluid [kg/m³].
+    pub fn joints(&self, density: f64, has: impl Fn(u32) -> bool) -> Vec<Joint> {
         let mass = (0..self.grid.dimension()).fold(density, |m, _| m * self.grid.dx);
-        self.bodies.iter().map(|body| body.joint(mass)).collect()
+        self.bodies.iter().map(|body| body.joint(mass, &has)).collect()
     }
 
     /// The speed of the fastest body [m/s].
@@ -690,14 +691,48 @@ impl Solids {
         (1..self.grid.dimension()).fold(1.0, |a, _| a * self.grid.dx)
     }
 
-    /// The force of a pressure on each of them [N], colliders then bodies; in the plane, of one metre across it.         (gas.12)
-    pub fn forces(&self, pressure: &Field) -> Vec<[f64; 3]> {
-        let mut all = vec![[0.0; 3]; self.colliders.len() + self.bodies.len()];
+    /// By how much a pressure is higher at the surface in a cell than at its middle [Pa], from its slope among the cells that `has` says. (pic.13)
+    pub fn rise(&self, pressure: &Field, cell: u32, has: &impl Fn(u32) -> bool) -> f64 {
+        let (lattice, at) = (self.grid.lattice(), cell as usize);
+        let (distance, normal) = self.middle_and_normal(at);
+        let wet = |at: usize| has(at as u32) && self.alive(lattice.place(at));
+        let p = |at: usize| f64::from(pressure.data[at]);
+        let along = |axis: usize| {
+            let (low, high) = (at - lattice.stride[axis], at + lattice.stride[axis]);
+            let slope = match (wet(low), wet(high)) {
+                (true, true) => 0.5 * (p(high) - p(low)),
+                (true, false) => p(at) - p(low),
+                (false, true) => p(high) - p(at),
+                (false, false) => 0.0,
+            };
+            -slope * f64::from(normal[axis])
+        };
+        self.grid.axes().map(along).sum::<f64>() * f64::from(distance) / self.grid.dx
+    }
+
+    /// Gives bodies for h seconds what a pressure is higher at their surface than at the middle of the cells that `has` says.         (pic.13)
+    pub fn lift(&mut self, h: f64, pressure: &Field, has: impl Fn(u32) -> bool) {
+        let scale = h * self.area();
+        let wrenches: Vec<_> = self.bodies.iter().map(|body| body.sum(|cell| self.rise(pressure, cell, &has), &has)).collect();
+        self.bodies.iter_mut().zip(wrenches).for_each(|(body, wrench)| body.yield_to(&wrench, scale));
+    }
+
+    /// Columns of the force of the pressure that cells have [N], three numbers for a collider and for each body of an object; in the plane, of one
+    /// metre across it.                                                                                              (gas.12)
+    pub fn forces(&self, pressure: impl Fn(u32) -> f64) -> impl Iterator<Item = Column> {
+        let mut each = vec![[0.0; 3]; self.colliders.len() + self.bodies.len()];
         for cut in &self.cuts {
-            let p: f64 = cut.pushes().map(|(cell, share)| f64::from(share) * f64::from(pressure.data[cell as usize])).sum();
-            all[cut.solid as usize][cut.axis] += self.area() * p;
+            let p: f64 = cut.pushes().map(|(cell, share)| f64::from(share) * pressure(cell)).sum();
+            each[cut.solid as usize][cut.axis] += self.area() * p;
         }
-        all
+        let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
+        for (name, force) in self.names().zip(each) {
+            match all.last_mut().filter(|(last, _)| last == name) {
+                Some((_, forces)) => forces.extend(force),
+                None => all.push((name, force.to_vec())),
+            }
+        }
+        all.into_iter().map(|(name, forces)| Column::new(name, "force", forces))
     }
 }
 

@@ -39,9 +39,20 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
             }
         }
     }
+    let (vertices, quads) = net(&values, n, &place);
+    let mut mesh = Mesh { vertices, ..Mesh::default() };
+    spread(phi, &mut mesh.vertices, &quads, cell);
+    mesh.triangles = halved(&mesh.vertices, &quads);
+    mesh
+}
+
+/// Vertices and quadrilaterals of the surface on which values at the points of a lattice are zero, inside below zero; the points lie where `place`
+/// says.
+pub fn net(values: &[f64], n: [usize; 3], place: &dyn Fn([usize; 3]) -> Vector) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
+    let index = |i: [usize; 3]| (i[2] * n[1] + i[1]) * n[0] + i[0];
     // Of each cell the vertex of each edge that is crossed.
     let mut numbers: HashMap<usize, [u32; 12]> = HashMap::new();
-    let (mut mesh, mut quads) = (Mesh::default(), Vec::new());
+    let (mut vertices, mut quads) = (Vec::<[f64; 3]>::new(), Vec::new());
     for i in lattice(n.map(|n| n - 1)) {
         let corner = |c: usize| -> [usize; 3] { std::array::from_fn(|k| i[k] + (c >> k & 1)) };
         let inside: [bool; 8] = std::array::from_fn(|c| values[index(corner(c))] < 0.0);
@@ -60,9 +71,9 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
                 let (u, v) = (values[index(p)], values[index(q)]);
                 sum = sum + place(p) + (place(q) - place(p)) * (u / (u - v));
                 count += 1.0;
-                own[e] = mesh.vertices.len() as u32;
+                own[e] = vertices.len() as u32;
             }
-            mesh.vertices.push((sum * (1.0 / count)).into());
+            vertices.push((sum * (1.0 / count)).into());
         }
         numbers.insert(index(i), own);
     }
@@ -92,14 +103,17 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
             quads.push([p, q, r, s]);
         }
     }
-    spread(phi, &mut mesh.vertices, &quads, cell);
-    for [p, q, r, s] in quads {
-        let at = |i: u32| Vector::from(mesh.vertices[i as usize]);
-        // The shorter diagonal.
+    (vertices, quads)
+}
+
+/// Two triangles for each quadrilateral, along its shorter diagonal.
+pub fn halved(vertices: &[[f64; 3]], quads: &[[u32; 4]]) -> Vec<[u32; 3]> {
+    let at = |i: u32| Vector::from(vertices[i as usize]);
+    let halves = |[p, q, r, s]: [u32; 4]| {
         let short = (at(p) - at(r)).norm_sq() <= (at(q) - at(s)).norm_sq();
-        mesh.triangles.extend(if short { [[p, q, r], [p, r, s]] } else { [[q, r, s], [q, s, p]] });
-    }
-    mesh
+        if short { [[p, q, r], [p, r, s]] } else { [[q, r, s], [q, s, p]] }
+    };
+    quads.iter().flat_map(|quad| halves(*quad)).collect()
 }
 
 /// Each vertex goes half the way to the middle of its neighbours along the surface, then onto it.

@@ -34,7 +34,7 @@ mod surface;
 pub use block::block;
 pub use cloth::cloth;
 pub use clump::crowded;
-pub use emitter::{emitter, region};
+pub use emitter::{emitter, region, volume};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
 pub use grains::grains;

@@ -1,8 +1,8 @@
 //! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
-use super::{MethodRules, bodies_of, is_in, on_grid, place, rules};
-use crate::exchange::BodyState;
-use crate::fluids::{Beyond, Hull, Immersed, Sheet, Solids, hold};
+use super::movers::{Mover, too_small, unbounded};
+use super::{MethodRules, is_in, on_grid};
+use crate::fluids::{Beyond, Immersed, Sheet, Solids, hold};
 use crate::forces::Gravity;
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
@@ -17,15 +17,13 @@ use crate::scene::laws::{Reader, flat, off_plane};
 use crate::state::{Field, Grid, Place, Vectors};
 use crate::system::System;
 use crate::systems::gas::{Fire, Fluid, Gas, Settings, Source};
-use crate::systems::rigid;
 use std::sync::Arc;
-use tumble_interface::check::{plain, short, suggestion};
+use tumble_interface::check::{plain, suggestion};
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
     Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method,
     Order, PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature, Viscous,
 };
-use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
 
 /// Largest |div u| dx over the fastest velocity.
@@ -34,12 +32,6 @@ const TOLERANCE: f64 = 1e-5;
 /// Largest |div u| dx over the fastest velocity.
 #[cfg(feature = "double")]
 const TOLERANCE: f64 = 1e-10;
-
-/// Radius of a ball or capsule in cells at least, and reach of any body: what is smaller may close no face.
-const LEAST_RADIUS: f64 = 1.5;
-
-/// Bodies that one fluid moves at most.
-const MOST_BODIES: usize = 256;
 
 pub struct Rules;
 
@@ -85,9 +77,7 @@ impl MethodRules for Rules {
     }
 
     fn hints(&self, scene: &Scene) -> Vec<Warning> {
-        let alone = scene.gas.iter().filter(|gas| scene.collider.is_empty() && !gas.bodies.is_empty());
-        let message = "the sides of the box are no obstacle to bodies, and there is no collider; add one of its shape with inside = true";
-        alone.map(|gas| Warning::new(Code::NoCollider, format!("gas \"{}\".bodies", gas.name), message)).collect()
+        scene.gas.iter().filter_map(|gas| unbounded(scene, "gas", &gas.name, &gas.bodies)).collect()
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
@@ -340,18 +330,8 @@ impl Read<'_, '_> {
     /// The bodies that it moves; each must cover some cells.
     fn bodies(&mut self, grid: &Grid) -> Vec<Immersed> {
         let bodies = std::mem::take(&mut self.bodies);
-        let least = LEAST_RADIUS * grid.dx;
-        for body in &bodies {
-            let radius = body.hull.radius();
-            if radius < least {
-                let message = format!(
-                    "a body of \"{}\" has a radius of {} m, expected >= {LEAST_RADIUS} cells = {} m; raise box.resolution or the radius",
-                    body.name(),
-                    short(radius),
-                    short(least)
-                );
-                self.wrong(".bodies", message);
-            }
+        for message in too_small(&bodies, grid) {
+            self.wrong(".bodies", message);
         }
         bodies
     }
@@ -521,61 +501,16 @@ impl Read<'_, '_> {
 const THREAD: f64 = 1.2;
 const DENSE: f64 = 10.0;
 
-/// Hulls and rows in their system, with the states at the start, of what a fluid is to move as bodies: [[body]], or masses as balls.
-fn hulls(builder: &Builder<'_>, name: &str, system: usize) -> Option<Vec<(usize, Hull, BodyState)>> {
-    let (scene, parts) = (builder.scene, &builder.masses[system]);
-    if scene.body.iter().any(|thing| thing.name == name) {
-        let Some((first, made)) = bodies_of(scene, builder.assets, name) else { return Some(Vec::new()) };
-        let hull = Hull { reach: made.outline.reach, volume: made.volume(), solid: Arc::new(made.solid) };
-        let state = |body: &rigid::Body| BodyState {
-            position: body.x,
-            orientation: body.q,
-            velocity: body.v,
-            spin: body.w,
-            inverse_mass: body.inverse_mass,
-            ..BodyState::default()
-        };
-        return Some(made.bodies.iter().enumerate().map(|(i, body)| (first + i, hull.clone(), state(body))).collect());
-    }
-    let thing = scene.particles.iter().find(|thing| thing.name == name)?;
-    let range = parts.ranges().find(|(n, _)| *n == name).map_or(0..0, |(_, range)| range);
-    let hull = Hull::ball(name, thing.radius, flat(scene).is_some());
-    let ball = |row: usize| {
-        let row = row as u32;
-        let (position, velocity, inverse_mass) = (parts.position(row), parts.velocity(row), parts.inverse_mass(row));
-        (row as usize, hull.clone(), BodyState { position, velocity, inverse_mass, ..BodyState::default() })
-    };
-    Some(range.map(ball).collect())
-}
-
 /// The bodies and sheets that a fluid moves.
 fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Immersed>, Vec<Sheet>) {
-    let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
-    for (i, name) in words.bodies.iter().enumerate() {
-        let at = format!("gas \"{}\".bodies[{i}]", words.name);
-        let Some(system) = moved_by(builder.scene, words, name, &mut |message| builder.issues.push(Issue::new(at.clone(), message))) else {
-            continue;
-        };
-        let Some(found) = hulls(builder, name, system) else {
-            let message = format!("\"{name}\" is no object of [[body]], nor of [[particles]], whose masses could be balls");
-            builder.issues.push(Issue::new(at, message));
-            continue;
-        };
-        if bodies.len() + found.len() > MOST_BODIES {
-            let message = format!("\"{name}\" has {} bodies; a fluid moves {MOST_BODIES} at most", found.len());
-            builder.issues.push(Issue::new(at, message));
-            continue;
-        }
-        let (Some((first, ..)), Some((last, ..))) = (found.first(), found.last()) else { continue };
-        let rows = builder.exchange.open(builder.ids[system], *first..last + 1, true);
-        bodies.extend(rows.into_iter().zip(found).map(|(row, (_, hull, state))| Immersed::new(row, hull, state)));
-    }
+    let mover = Mover { kind: "gas", name: &words.name, system: words.system.as_deref(), bodies: &words.bodies };
+    let (bodies, mut sheets) = (mover.bodies(builder), Vec::new());
     let (scene, parts, ids) = (builder.scene, &builder.masses, &builder.ids);
     let (exchange, issues) = (&mut builder.exchange, &mut builder.issues);
     for (i, sheet) in words.sheet.iter().enumerate() {
         let name = &sheet.object;
         let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
-        let Some(system) = moved_by(scene, words, name, &mut wrong) else { continue };
+        let Some(system) = mover.system_of(scene, name, &mut wrong) else { continue };
         let Some(object) = parts[system].named(name) else { continue };
         let longest = object.breaks.unwrap_or(f64::INFINITY);
         let (triangles, curve) = match (scene.dimension, object.triangles.is_empty()) {
@@ -593,36 +528,6 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Immersed>, Vec<Sheet>
         sheets.push(Sheet::new(name.clone(), rows, triangles, curve, [resistance, sheet.friction]));
     }
     (bodies, sheets)
-}
-
-/// The system of an object that a fluid is to move.
-fn moved_by(scene: &Scene, words: &Words, name: &str, wrong: &mut dyn FnMut(String)) -> Option<usize> {
-    let (all, plans) = (scene.objects(), &scene.system);
-    let Some(object) = all.iter().find(|o| o.name == name) else {
-        let hint = suggestion(name, all.iter().map(|o| o.name));
-        wrong(format!("there is no object \"{name}\"{hint}"));
-        return None;
-    };
-    let all = scene.gas.iter().flat_map(|gas| gas.bodies.iter().chain(gas.sheet.iter().map(|sheet| &sheet.object)));
-    if all.filter(|other| *other == name).count() > 1 {
-        wrong(format!("\"{name}\" is named more than once; one fluid moves it, as a body or as a sheet"));
-        return None;
-    }
-    let (own, other) = (place(plans, "gas", words.system.as_deref())?, place(plans, object.kind, object.system)?);
-    let is_body = object.kind == "body" && words.bodies.iter().any(|body| body == name);
-    if !is_body && rules(plans[other].method).massless().is_some() {
-        wrong(format!("\"{name}\" is in a system of method {}; a fluid moves masses of dynamics", plans[other].method.name()));
-        return None;
-    }
-    if other < own {
-        // Otherwise the masses would fall for an interval before they feel the fluid.
-        wrong(format!(
-            "system \"{}\" of \"{name}\" comes before the fluid that moves it; put [[system]] \"{}\" first",
-            plans[other].name, plans[own].name
-        ));
-        return None;
-    }
-    Some(other)
 }
 
 /// Bytes for a cell of a fluid: velocities, what is carried, and what steps and solvers need; a snapshot of the state.

@@ -1,12 +1,13 @@
 //! Liquids with a free surface: words to particles in a box.
 
+use super::movers::{Mover, too_small, unbounded};
 use super::{MethodRules, is_in};
-use crate::fluids::Solids;
+use crate::fluids::{Immersed, Solids};
 use crate::forces::Gravity;
 use crate::geometry::Collider;
 use crate::math::formula::Of;
 use crate::math::{Real, Vec3, VectorSignal};
-use crate::recipes::region;
+use crate::recipes::{placed, region, volume};
 use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::scene::grids::{cells, grid};
@@ -14,12 +15,15 @@ use crate::scene::laws::{Reader, flat, off_plane};
 use crate::scene::plausible::odd_density;
 use crate::state::Grid;
 use crate::system::System;
-use crate::systems::liquid::{Accuracy, Liquid as Tanks, Particles, Settings, Tank, Transfer};
+use crate::systems::liquid::{Accuracy, Inflow, Liquid as Tanks, Openings, Particles, Region, Settings, Tank, Transfer, longest};
 use std::sync::Arc;
+use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{Integrator, Liquid, LiquidFill, LiquidTransfer, Method, Scene, Shape, System as Plan};
+use tumble_interface::scene::{
+    AnimatedVector, Integrator, Liquid, LiquidFill, LiquidTransfer, MeshFile, Method, Scene, Shape, Solid, System as Plan,
+};
 use tumble_interface::warning::Code;
-use tumble_interface::{Issue, Warning};
+use tumble_interface::{Issue, Mesh, Warning};
 
 /// Largest |div u| dx over the fastest velocity.
 #[cfg(not(feature = "double"))]
@@ -27,6 +31,8 @@ const TOLERANCE: f64 = 1e-4;
 /// Largest |div u| dx over the fastest velocity.
 #[cfg(feature = "double")]
 const TOLERANCE: f64 = 1e-9;
+/// Colour of the light that comes through a liquid.
+const WATER: [f64; 3] = [0.55, 0.85, 0.95];
 /// Part of its own velocity that a particle keeps.
 const FLIP: f64 = 0.97;
 
@@ -44,6 +50,11 @@ impl MethodRules for Rules {
 
     fn kinds(&self) -> &'static [&'static str] {
         &["liquid"]
+    }
+
+    /// What a liquid moves comes after it.
+    fn leads(&self, scene: &Scene) -> bool {
+        scene.liquid.iter().any(|liquid| !liquid.bodies.is_empty())
     }
 
     fn massless(&self) -> Option<&'static str> {
@@ -64,15 +75,35 @@ impl MethodRules for Rules {
                 let message = "given without transfer = \"flip\"; leave it out, or set that";
                 issues.push(Issue::new(format!("liquid \"{}\".flip_ratio", thing.name), message));
             }
+            if thing.surface == Some(true) && scene.dimension == 2 {
+                let message = "true, but in the plane there are no triangles; leave it out";
+                issues.push(Issue::new(format!("liquid \"{}\".surface", thing.name), message));
+            }
+            if thing.solids == Solid::NoSlip && thing.viscosity == 0.0 {
+                let message = "no_slip without viscosity, which is what sticks; set viscosity, 1e-3 Pa s for water, or leave it out";
+                issues.push(Issue::new(format!("liquid \"{}\".solids", thing.name), message));
+            }
+            let flows = !thing.inflow.is_empty() || !thing.drain.is_empty();
+            if flows && scene.expect.max_volume_error.is_some() {
+                let message = format!("\"{}\" comes in or leaves, so that its volume is meant to change; leave it out", thing.name);
+                issues.push(Issue::new("expect.max_volume_error", message));
+            }
+            let plan = scene.system.iter().find(|plan| is_in(&thing.system, plan));
+            issues.extend(plan.and_then(|plan| too_long(scene, plan, thing)));
         }
     }
 
     fn hints(&self, scene: &Scene) -> Vec<Warning> {
         let odd = |thing: &Liquid| odd_density(format!("liquid \"{}\".density", thing.name), thing.density, 0.0);
         let mut warnings: Vec<Warning> = scene.liquid.iter().filter_map(odd).collect();
-        let mut others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "liquid"));
+        warnings.extend(scene.liquid.iter().filter_map(|thing| unbounded(scene, "liquid", &thing.name, &thing.bodies)));
+        let moved = |name: &str| scene.liquid.iter().any(|thing| thing.bodies.iter().any(|body| body == name));
+        let mut others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "liquid" | "joint") && !moved(o.name));
         if let (Some(other), false) = (others.next(), scene.liquid.is_empty()) {
-            let message = format!("liquids on a grid meet colliders, but not yet what [[{}]] consists of, nor each other", other.kind);
+            let message = format!(
+                "liquids on a grid meet colliders, and what their `bodies` name, but not what [[{}]] consists of, nor each other",
+                other.kind
+            );
             warnings.push(Warning::new(Code::Unfelt, format!("liquid \"{}\"", scene.liquid[0].name), message));
         }
         warnings
@@ -81,6 +112,9 @@ impl MethodRules for Rules {
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let own = scene.liquid.iter().filter(|thing| is_in(&thing.system, plan));
         own.map(|thing| {
+            if has_surface(thing, flat(scene)) {
+                return Look::new(&format!("{}.surface", thing.name), Form::Liquid, thing.color.unwrap_or(WATER));
+            }
             let radius = 0.5 * spacing(thing, flat(scene));
             let few = fill_cells(thing, flat(scene)) * per_cell(thing, flat(scene)) < FEW;
             Look { few, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) }
@@ -99,11 +133,20 @@ impl MethodRules for Rules {
         let mut tanks = Vec::new();
         for words in scene.liquid.iter().filter(|words| is_in(&words.system, plan)) {
             let path = format!("liquid \"{}\"", words.name);
+            let bodies =
+                Mover { kind: "liquid", name: &words.name, system: words.system.as_deref(), bodies: &words.bodies }.bodies(builder);
+            let assets = builder.assets;
             let reader = Reader::new(scene, &mut builder.issues);
-            tanks.extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders }.tank(gravity.clone()));
+            let read = Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, assets };
+            tanks.extend(read.tank(gravity.clone(), bodies));
         }
         Some(Box::new(Tanks::new(plan.name.clone(), plan.substeps, plan.step, tanks)))
     }
+}
+
+/// Whether frames have its surface.
+fn has_surface(words: &Liquid, flat: Option<usize>) -> bool {
+    words.surface.unwrap_or(flat.is_none())
 }
 
 /// Particles in a cell.
@@ -132,7 +175,27 @@ fn fill_cells(words: &Liquid, flat: Option<usize>) -> f64 {
         Shape::Sphere { radius, .. } => all(&|_| 2.0 * radius),
         _ => all(&|_| f64::INFINITY),
     };
-    words.fill.iter().map(of).sum::<f64>().min(all(&|_| f64::INFINITY))
+    let most = all(&|_| f64::INFINITY);
+    if words.inflow.is_empty() { words.fill.iter().map(of).sum::<f64>().min(most) } else { most }
+}
+
+/// Steps that are given, and longer than waves of surface tension bear.
+fn too_long(scene: &Scene, plan: &Plan, words: &Liquid) -> Option<Issue> {
+    let interval = 1.0 / (scene.time.fps * f64::from(scene.time.exchanges.unwrap_or(1)));
+    let (key, step) = match (plan.substeps, plan.step) {
+        (Some(n), _) => ("substeps", interval / f64::from(n)),
+        (None, Some(step)) => ("step", step.min(interval)),
+        (None, None) => return None,
+    };
+    let most = longest(words.density, words.surface_tension, cell(words, flat(scene)));
+    let cure = if key == "step" { format!("{} s", short(most)) } else { format!("{}", (interval / most).ceil()) };
+    let message = format!(
+        "steps of {} s, but the surface tension of \"{}\" bears {} s at most; leave it out, or set {cure}",
+        short(step),
+        words.name,
+        short(most)
+    );
+    (words.surface_tension > 0.0 && step > most).then(|| Issue::new(format!("system \"{}\".{key}", plan.name), message))
 }
 
 /// Reads the words of one liquid; everything wrong goes to the reader.
@@ -142,6 +205,7 @@ struct Read<'a, 'b> {
     reader: Reader<'b>,
     flat: Option<usize>,
     solids: &'a Arc<Vec<Collider>>,
+    assets: &'a Assets,
 }
 
 impl Read<'_, '_> {
@@ -149,7 +213,7 @@ impl Read<'_, '_> {
         self.reader.issues.push(Issue::new(format!("{}{key}", self.path), message));
     }
 
-    fn tank(mut self, gravity: Gravity) -> Option<Tank> {
+    fn tank(mut self, gravity: Gravity, bodies: Vec<Immersed>) -> Option<Tank> {
         let (words, before) = (self.words, self.reader.issues.len());
         let grid = match grid(&words.cells, self.flat, [false; 3]) {
             Ok(grid) => grid,
@@ -158,16 +222,21 @@ impl Read<'_, '_> {
                 return None;
             }
         };
-        if words.fill.is_empty() {
-            self.wrong(".fill", "empty, expected at least one volume, such as { shape = { box = { size = [1, 1, 1] } } }");
+        if words.fill.is_empty() && words.inflow.is_empty() {
+            let message = "empty, expected at least one volume, such as { shape = { box = { size = [1, 1, 1] } } }, or an inflow";
+            self.wrong(".fill", message);
+        }
+        for message in too_small(&bodies, &grid) {
+            self.wrong(".bodies", message);
         }
         let fills: Vec<Option<(Collider, VectorSignal)>> = words.fill.iter().enumerate().map(|(i, fill)| self.fill(i, fill)).collect();
+        let mut solids = Solids::new(self.solids.clone(), bodies, words.solids == Solid::NoSlip, grid, &Default::default());
+        solids.place(0.0);
+        let openings = self.openings(&grid, &solids);
         if self.reader.issues.len() > before {
             return None;
         }
         let fills: Vec<(Collider, VectorSignal)> = fills.into_iter().flatten().collect();
-        let mut solids = Solids::new(self.solids.clone(), Vec::new(), false, grid, &Default::default());
-        solids.place(0.0);
         let solids = (solids.moves() || !solids.is_empty()).then_some(solids);
         let (x, v, counts) = particles(&grid, words.sampling, &fills, solids.as_ref());
         for (i, _) in counts.iter().enumerate().filter(|(_, count)| **count == 0) {
@@ -187,6 +256,11 @@ impl Read<'_, '_> {
         };
         let settings = Settings {
             density: words.density,
+            viscosity: words.viscosity,
+            tension: words.surface_tension,
+            stick: words.solids == Solid::NoSlip,
+            sampling: words.sampling,
+            surface: has_surface(words, self.flat),
             particle: 1.0 / per_cell(words, self.flat),
             transfer,
             keep_volume: words.keep_volume,
@@ -201,7 +275,7 @@ impl Read<'_, '_> {
             courant: words.courant,
         };
         let particles = Particles::new(x, v, transfer == Transfer::Apic);
-        match Tank::new(words.name.clone(), settings, grid, solids, particles) {
+        match Tank::new(words.name.clone(), settings, grid, solids, particles, openings) {
             Ok(tank) => Some(tank),
             Err(error) => {
                 self.wrong(".box", error.to_string());
@@ -213,8 +287,16 @@ impl Read<'_, '_> {
     /// A volume, and the velocity in it.
     fn fill(&mut self, index: usize, fill: &LiquidFill) -> Option<(Collider, VectorSignal)> {
         let key = |key: &str| format!(".fill[{index}].{key}");
-        if matches!(fill.shape, Shape::Lathe { .. } | Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_)) {
-            self.wrong(&key("shape"), "a mesh or a solid of revolution, expected sphere, box, plane, floor or capsule");
+        let meshes: Vec<Mesh> = match &fill.shape {
+            Shape::Mesh(file) => self.assets.get(&file.path).map(|mesh| placed(mesh, file)).into_iter().collect(),
+            _ => Vec::new(),
+        };
+        if let Shape::Mesh(MeshFile { shell: true, .. }) = &fill.shape {
+            self.wrong(&key("shape.mesh.shell"), "true, but a shell has no inside that could be filled; leave it out");
+            return None;
+        }
+        if let Some(message) = no_volume(&fill.shape, true) {
+            self.wrong(&key("shape"), message);
             return None;
         }
         let velocity = self.reader.vector(&format!("{}{}", self.path, key("velocity")), &fill.velocity, Of::Start);
@@ -226,13 +308,83 @@ impl Read<'_, '_> {
                 self.wrong(&key("velocity"), off_plane(axis, across));
             }
         }
-        match region(&fill.shape) {
+        match volume(&fill.shape, &meshes) {
             Ok(region) => Some((region, velocity)),
             Err((at, message)) => {
                 self.wrong(&key(&format!("shape{at}")), message);
                 None
             }
         }
+    }
+
+    /// Where it comes in and leaves.
+    fn openings(&mut self, grid: &Grid, solids: &Solids) -> Openings {
+        let words = self.words;
+        let mut openings = Openings::default();
+        for (i, inflow) in words.inflow.iter().enumerate() {
+            let key = format!(".inflow[{i}]");
+            let region = self.region(&key, &inflow.shape, (inflow.start, inflow.end), grid, solids);
+            let velocity = self.inflow_velocity(&key, &inflow.velocity);
+            openings.inflows.extend(region.zip(velocity).map(|(region, velocity)| Inflow::new(region, velocity)));
+        }
+        for (i, drain) in words.drain.iter().enumerate() {
+            openings.drains.extend(self.region(&format!(".drain[{i}]"), &drain.shape, (drain.start, drain.end), grid, solids));
+        }
+        openings
+    }
+
+    fn inflow_velocity(&mut self, key: &str, words: &AnimatedVector) -> Option<VectorSignal> {
+        let (key, before) = (format!("{key}.velocity"), self.reader.issues.len());
+        let velocity = self.reader.vector(&format!("{}{key}", self.path), words, Of::Time);
+        if velocity.is_constant() {
+            let v: [f64; 3] = velocity.value(0.0).into();
+            if v == [0.0; 3] {
+                self.wrong(&key, "[0, 0, 0] m/s: nothing comes in; give a velocity");
+            }
+            if let Some(axis) = self.flat.filter(|axis| v[*axis] != 0.0) {
+                self.wrong(&key, off_plane(axis, v[axis]));
+            }
+        }
+        (self.reader.issues.len() == before).then_some(velocity)
+    }
+
+    /// A volume that lies, at least in part, in the box and out of solids.
+    fn region(&mut self, key: &str, shape: &Shape, (start, end): (f64, Option<f64>), grid: &Grid, solids: &Solids) -> Option<Region> {
+        if end.is_some_and(|end| end <= start) {
+            self.wrong(&format!("{key}.end"), format!("{} s, expected > start = {} s", short(end.unwrap_or(0.0)), short(start)));
+            return None;
+        }
+        if let Some(message) = no_volume(shape, false) {
+            self.wrong(&format!("{key}.shape"), message);
+            return None;
+        }
+        match region(shape) {
+            Err((at, message)) => {
+                self.wrong(&format!("{key}.shape{at}"), message);
+                None
+            }
+            Ok(shape) => {
+                let region = Region::new(shape, [start, end.unwrap_or(f64::INFINITY)], grid);
+                if !region.is_open(grid, self.words.sampling, solids) {
+                    let message = "it holds no place of a particle; move it into the box and out of colliders, or make it larger";
+                    self.wrong(&format!("{key}.shape"), message);
+                    return None;
+                }
+                Some(region)
+            }
+        }
+    }
+}
+
+/// What is wrong with a shape that is to be a volume.
+fn no_volume(shape: &Shape, meshes: bool) -> Option<&'static str> {
+    match shape {
+        Shape::Mesh(_) if meshes => None,
+        Shape::Mesh(_) => Some("a mesh, expected sphere, box, plane, floor or capsule"),
+        Shape::Lathe { .. } | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_) => {
+            Some("a solid of revolution, a figure or a mesh that moves, expected sphere, box, plane, floor, capsule or mesh")
+        }
+        _ => None,
     }
 }
 

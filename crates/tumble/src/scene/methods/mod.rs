@@ -7,6 +7,7 @@ mod gas;
 mod grains;
 mod heat;
 mod liquid;
+mod movers;
 mod rigid;
 mod tracers;
 mod vicsek;
@@ -216,7 +217,7 @@ pub fn resolve(mut scene: Scene) -> Scene {
         }
     }
     scene.system = systems;
-    let immersed = scene.gas.iter().any(|gas| moves_bodies(&scene, gas));
+    let immersed = movers::lists(&scene).any(|(_, names)| movers::moves_bodies(&scene, names));
     let often = if immersed || touches(&scene) { (RATE / scene.time.fps).ceil().clamp(1.0, 1e5) as u32 } else { 1 };
     scene.time.exchanges.get_or_insert(often);
     scene
@@ -231,11 +232,6 @@ pub fn touches(scene: &Scene) -> bool {
 pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
     matches!(mover, Some(Method::Grains | Method::Dynamics))
-}
-
-/// Whether a fluid moves rigid bodies.
-pub fn moves_bodies(scene: &Scene, gas: &tumble_interface::scene::Gas) -> bool {
-    gas.bodies.iter().any(|name| scene.body.iter().any(|thing| thing.name == *name))
 }
 
 /// A system for each method that objects of the scene need.

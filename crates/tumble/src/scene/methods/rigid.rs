@@ -1,6 +1,7 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::{MethodRules, is_in, moves_bodies, scheme_of_its_own, touches, visits_bodies};
+use super::movers::{lists, moves_bodies};
+use super::{MethodRules, is_in, scheme_of_its_own, touches, visits_bodies};
 use crate::exchange::{BodyRow, BodySurface};
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};
@@ -83,7 +84,10 @@ impl MethodRules for Rules {
                     ends.iter().any(|end| end == name) && ends.iter().any(|end| scene.body.iter().any(|thing| thing.name == *end))
                 })
             };
-        let moves = |name: &str| scene.gas.iter().any(|gas| gas.name == name && moves_bodies(scene, gas));
+        let fluids =
+            scene.gas.iter().map(|gas| (&gas.name, &gas.bodies)).chain(scene.liquid.iter().map(|thing| (&thing.name, &thing.bodies)));
+        let moving: Vec<&String> = fluids.filter(|(_, names)| moves_bodies(scene, names)).map(|(name, _)| name).collect();
+        let moves = |name: &str| moving.iter().any(|fluid| *fluid == name);
         let others = scene
             .objects()
             .into_iter()
@@ -91,7 +95,7 @@ impl MethodRules for Rules {
         let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
             let message = format!(
-                "rigid bodies meet each other, colliders, grains, and masses of dynamics systems, and a gas where its `bodies` name them, but not what [[{other}]] consists of, nor does that meet them"
+                "rigid bodies meet each other, colliders, grains, and masses of dynamics systems, and a gas or a liquid where its `bodies` name them, but not what [[{other}]] consists of, nor does that meet them"
             );
             warnings.push(Warning::new(Code::Unfelt, "body", message));
         }
@@ -248,11 +252,11 @@ fn changing(scene: &Scene, issues: &mut Vec<Issue>) {
             }
         }
     }
-    for gas in &scene.gas {
-        for name in &gas.bodies {
+    for (at, names) in lists(scene) {
+        for name in names {
             if let Some((thing, why)) = scene.body.iter().find(|thing| thing.name == *name).and_then(|thing| Some((thing, why(thing)?))) {
-                let message = format!("bodies of \"{}\" {why}, and a gas moves bodies that stay as they are; leave them out", thing.name);
-                wrong(format!("gas \"{}\".bodies", gas.name), message);
+                let message = format!("bodies of \"{}\" {why}, and a fluid moves bodies that stay as they are; leave them out", thing.name);
+                wrong(at.clone(), message);
             }
         }
     }

@@ -317,7 +317,7 @@ impl Fluid {
     /// Makes its bodies a part of the pressure's matrix.
     fn join(&mut self) {
         if let Some(solids) = &self.solids {
-            self.solver.join(solids.joints(self.settings.density));
+            self.solver.join(solids.joints(self.settings.density, |_| true));
         }
     }
 
@@ -388,7 +388,7 @@ fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<So
     let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
     let solver = match solids {
         Some(solids) => Solver::new(lattice, sides, solids.open.each_ref().map(Vec::as_slice), None).map(|mut solver| {
-            solver.join(solids.joints(settings.density));
+            solver.join(solids.joints(settings.density, |_| true));
             solver
         }),
         None => Solver::empty(lattice, sides),

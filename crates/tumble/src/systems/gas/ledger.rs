@@ -68,17 +68,9 @@ impl Fluid {
         vectors.parts.iter().map(|part| average(part, Place::Cell)).collect()
     }
 
-    /// The force of the last pressure on every solid [N], three numbers for a collider and for each body of an object.
-    pub fn forces_on(&self) -> Vec<(&str, Vec<f64>)> {
-        let Some(solids) = &self.solids else { return Vec::new() };
-        let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
-        for (name, force) in solids.names().zip(solids.forces(&self.pressure)) {
-            match all.last_mut().filter(|(last, _)| last == name) {
-                Some((_, forces)) => forces.extend(force),
-                None => all.push((name, force.to_vec())),
-            }
-        }
-        all
+    /// The force of the last pressure on every solid.
+    pub fn forces_on(&self) -> impl Iterator<Item = Column> {
+        self.solids.iter().flat_map(|solids| solids.forces(|cell| f64::from(self.pressure.data[cell as usize])))
     }
 
     /// Its grid.

@@ -47,18 +47,6 @@ impl Gas {
         Self { name, substeps, step, fluids, watched: false }
     }
 
-    /// The force of the pressure on every solid, of all fluids together.
-    fn forces(&self) -> Vec<Column> {
-        let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
-        for (name, forces) in self.fluids.iter().flat_map(Fluid::forces_on) {
-            match all.iter_mut().find(|(other, _)| *other == name) {
-                Some((_, sums)) => sums.iter_mut().zip(forces).for_each(|(sum, force)| *sum += force),
-                None => all.push((name, forces)),
-            }
-        }
-        all.into_iter().map(|(name, forces)| Column::new(name, "force", forces)).collect()
-    }
-
     /// The next sub-step [s] with this much of an interval dt left.
     fn next_step(&self, fluid: &Fluid, t: f64, dt: f64, left: f64) -> Result<f64, StepError> {
         if let Some(n) = self.substeps.map(f64::from).or(self.step.map(|step| equal_steps(dt, step))) {
@@ -133,7 +121,7 @@ impl System for Gas {
     fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));
         if names.contains(&"force") {
-            out.extend(self.forces());
+            out.extend(self.fluids.iter().flat_map(Fluid::forces_on));
         }
     }
 

@@ -1,10 +1,13 @@
 //! Output of a liquid: columns, ledger, snapshots, failures.
 
+use super::level::cell;
 use super::stencil::Sampler;
 use super::tank::Tank;
-use crate::fluids::Solids;
+use crate::fluids::{Immersed, Solids};
 use crate::math::Real;
 use crate::math::parallel::fold;
+use crate::operators::average;
+use crate::state::Place;
 use crate::system::{Archive, Part};
 use tumble_interface::engine::{Ledger, Worst};
 use tumble_interface::error::Breakdown;
@@ -40,11 +43,16 @@ impl Tank {
 
     /// The named columns that it has, by the numbers of its particles.
     pub fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        let varies = self.openings.any();
         let known = ["position", "velocity", "pressure"];
-        if !names.iter().any(|name| known.contains(name)) {
+        if !varies && !names.iter().any(|name| known.contains(name)) {
             return;
         }
         let rows = self.particles.rows();
+        if varies {
+            let ids: Vec<u32> = rows.iter().map(|row| self.particles.id[*row as usize]).collect();
+            out.push(Column::new(&self.name, "id", ids));
+        }
         let each = |of: &dyn Fn(usize) -> Three| rows.iter().flat_map(|row| of(*row as usize)).map(|c| c as Real).collect::<Vec<_>>();
         let particles = &self.particles;
         if let Some(full) = self.settings.shade.filter(|_| names.contains(&"position")) {
@@ -69,6 +77,19 @@ impl Tank {
         }
     }
 
+    /// Columns of its surface, an object of its own.
+    pub fn skin_columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        if !self.settings.surface || !names.contains(&"position") {
+            return;
+        }
+        let (skin, name) = (self.skin(), format!("{}.surface", self.name));
+        let rows = |of: &[[f64; 3]]| of.as_flattened().iter().map(|c| *c as Real).collect::<Vec<_>>();
+        out.push(Column::new(&name, "position", rows(&skin.vertices)));
+        // Vertices have no successors in the next frame that would say how they move.
+        out.push(Column::new(&name, "velocity", rows(&skin.velocities)));
+        out.push(Column::new(&name, "triangles", skin.triangles.concat()));
+    }
+
     /// The pressure at a place [Pa]: in the half of a cell before a side it goes on as before.
     fn pressure_at(&self, pressure: &Sampler<'_>, x: &[Real; 3]) -> Real {
         const BESIDE: Real = 0.501;
@@ -78,10 +99,41 @@ impl Tank {
         (0..3).fold(value[0], |p, a| p + slope[0][a] * (x[a] - near[a]))
     }
 
+    /// The force of the pressure on every solid.
+    pub fn forces_on(&self) -> impl Iterator<Item = Column> {
+        let wet = |at: u32| self.level.cells[at as usize] == cell::LIQUID;
+        let on = move |solids: &Solids, at: u32| {
+            if wet(at) { f64::from(self.pressure.data[at as usize]) + solids.rise(&self.pressure, at, &wet) } else { 0.0 }
+        };
+        self.solids.iter().flat_map(move |solids| solids.forces(move |at| on(solids, at)))
+    }
+
+    /// Columns of its cells, an object of their own: distance from the surface, and velocity.
+    pub fn cell_columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        if !names.contains(&"distance") {
+            return;
+        }
+        let (grid, name) = (self.grid(), format!("{}.cells", self.name));
+        let points: Vec<usize> = grid.axes().map(|a| grid.n[a]).collect();
+        let distance = self.level.distance.values().into_iter().map(|phi| phi * grid.dx as Real).collect::<Vec<Real>>();
+        out.push(Column::on_grid(&name, "distance", points.clone(), distance));
+        if names.contains(&"velocity") {
+            // Only a field of another grid could fail.
+            let u = self.face_velocities();
+            let means = u.parts.iter().map(|part| average(part, Place::Cell).map(|mean| mean.values()));
+            let Ok(means) = means.collect::<Result<Vec<_>, _>>() else { return };
+            let rows = (0..points.iter().product()).flat_map(|i| means.iter().map(move |mean| mean[i]));
+            out.push(Column::on_grid(&name, "velocity", points, rows.collect::<Vec<Real>>()));
+        }
+    }
+
     /// What does not change.
     pub fn topology(&self, out: &mut Vec<Column>) {
+        out.extend(self.grid().columns(&format!("{}.cells", self.name)));
         out.push(Column::new(&self.name, "radius", vec![self.radius()]));
-        out.push(Column::new(&self.name, "mass", vec![self.particle_mass() as Real; self.particles.count()]));
+        if !self.openings.any() {
+            out.push(Column::new(&self.name, "mass", vec![self.particle_mass() as Real; self.particles.count()]));
+        }
     }
 
     /// Sums over its particles, and the volume by its surface.
@@ -162,25 +214,39 @@ impl Tank {
         archive.push_field("pressure", &self.pressure);
         let time = self.solids.as_ref().map_or(0.0, |solids| solids.time);
         archive.push("step", Part::Numbers(vec![self.last, time]));
+        archive.push("openings", Part::Numbers(self.openings.numbers()));
+        let bodies = self.solids.as_ref().map_or(&[][..], |solids| &solids.bodies);
+        archive.push("bodies", Part::Numbers(bodies.iter().flat_map(Immersed::numbers).collect()));
     }
 
     /// Reads it back.
     pub fn restore(&mut self, archive: &mut Archive) -> Option<()> {
-        fn rows(numbers: Vec<Real>, into: &mut [[Real; 3]]) -> Option<()> {
-            (numbers.len() == 3 * into.len()).then_some(())?;
-            into.as_flattened_mut().copy_from_slice(&numbers);
-            Some(())
+        fn rows<const N: usize>(numbers: &[Real]) -> Vec<[Real; N]> {
+            numbers.as_chunks().0.to_vec()
         }
         let id = archive.indices("numbers")?;
-        (id.len() == self.particles.count() && id.iter().all(|id| (*id as usize) < self.particles.count())).then_some(())?;
-        self.particles.id = id;
-        rows(archive.table_of(3, "places")?, &mut self.particles.x)?;
-        rows(archive.table_of(3, "velocities")?, &mut self.particles.v)?;
-        rows(archive.table_of(9, "gradients")?, self.particles.gradient.as_flattened_mut())?;
+        let [x, v, gradient] = [(3, "places"), (3, "velocities"), (9, "gradients")].map(|(width, name)| archive.table_of(width, name));
+        let (x, v, gradient) = (x?, v?, gradient?);
+        let n = id.len();
+        let affine = if self.particles.is_affine() { 9 * n } else { 0 };
+        let fits = self.openings.any() || n == self.particles.count();
+        (fits && x.len() == 3 * n && v.len() == 3 * n && gradient.len() == affine).then_some(())?;
+        self.particles.put(
+            id,
+            rows(&x),
+            rows(&v),
+            gradient.as_chunks::<9>().0.iter().map(|g| [0, 1, 2].map(|a| [0, 1, 2].map(|b| g[3 * a + b]))).collect(),
+        );
         archive.field("pressure", &mut self.pressure)?;
         let [last, time] = archive.numbers("step")?[..] else { return None };
         self.last = last;
-        if self.solids.as_ref().is_some_and(Solids::moves) {
+        self.openings.put(&archive.numbers("openings")?)?;
+        let numbers = archive.numbers("bodies")?;
+        let bodies = self.bodies();
+        (numbers.len() == Immersed::NUMBERS * bodies.len()).then_some(())?;
+        bodies.iter_mut().zip(numbers.chunks_exact(Immersed::NUMBERS)).for_each(|(body, numbers)| body.put(numbers));
+        if let Some(solids) = self.solids.as_mut().filter(|solids| solids.moves()) {
+            solids.time = f64::NAN;
             self.put(time);
         }
         self.prepare();

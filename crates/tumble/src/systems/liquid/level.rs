@@ -32,6 +32,9 @@ pub mod cell {
     pub const OUTSIDE: u8 = 2;
 }
 
+/// A liquid that is nowhere around so deep is thin [cells].
+const DEEP: Real = 0.5;
+
 /// What a cell has, and all those around it together: nothing, particles, or a solid that keeps them away.
 const NOTHING: u8 = 1;
 const PARTICLES: u8 = 2;
@@ -92,8 +95,7 @@ impl Level {
         let first = lattice.at(0, 0, 0) - lattice.stride[1];
         let there = &*there;
         let tasks = distance.data[first..].chunks_mut(plane).zip(cells[first..].chunks_mut(plane)).zip(around[first..].chunks_mut(plane));
-        let volumes = tasks.take(z).enumerate().map_in_parallel(|(k, ((distance, cells), around))| {
-            let mut volume = 0.0;
+        tasks.take(z).enumerate().in_parallel(|(k, ((distance, cells), around))| {
             for j in 0..y {
                 let row = lattice.at(0, j, k);
                 let own = row - first - k * plane;
@@ -109,17 +111,42 @@ impl Level {
                     };
                     distance[own + i] = phi;
                     cells[own + i] = if phi < 0.0 { cell::LIQUID } else { cell::AIR };
-                    let open = solids.map_or(1.0, |solids| f64::from(share(solids.middle(row + i) / grid.dx as Real)));
-                    let part = share(-phi);
-                    // Drops of which nothing counts have the volume of their particles.
-                    let number = i + x * (j + y * k);
-                    let drops = if part == 0.0 { particles.between(number, number + 1).len() as f64 } else { 0.0 };
-                    volume += open * f64::from(part) + drops * particle;
+                }
+            }
+        });
+        self.volume = self.sum(particles, particle, solids);
+    }
+
+    /// The volume below the surface [cells]. Of drops and sheets thinner than a cell, particles say more than the surface around them.
+    fn sum(&self, particles: &Particles, particle: f64, solids: Option<&Solids>) -> f64 {
+        let (grid, phi) = (self.distance.grid, &self.distance.data);
+        let (lattice, [x, y, z]) = (grid.lattice(), grid.n);
+        let offsets = |a: usize| if grid.flat == Some(a) { [0, 0, 0] } else { [0, lattice.stride[a], 2 * lattice.stride[a]] };
+        let [across, along, up] = [0, 1, 2].map(offsets);
+        let first = grid.axes().map(|a| lattice.stride[a]).sum::<usize>();
+        let is_deep = |at: usize| {
+            let low = at - first;
+            up.iter().any(|z| along.iter().any(|y| across.iter().any(|x| phi[low + x + y + z] < -DEEP)))
+        };
+        let planes = (0..z).map_in_parallel(|k| {
+            let mut volume = 0.0;
+            for j in 0..y {
+                let row = lattice.at(0, j, k);
+                for i in 0..x {
+                    let (at, number) = (row + i, i + x * (j + y * k));
+                    let part = share(-phi[at]);
+                    let own = || particle * particles.between(number, number + 1).len() as f64;
+                    volume += match part {
+                        0.0 => own(),
+                        1.0 => open(&grid, solids, at),
+                        _ if is_deep(at) => open(&grid, solids, at) * f64::from(part),
+                        _ => own(),
+                    };
                 }
             }
             volume
         });
-        self.volume = volumes.iter().sum();
+        planes.iter().sum()
     }
 
     /// Which cells have particles; those in solids miss none.
@@ -145,6 +172,11 @@ impl Level {
             }
         });
     }
+}
+
+/// The part of a cell that solids leave.
+fn open(grid: &Grid, solids: Option<&Solids>, cell: usize) -> f64 {
+    solids.map_or(1.0, |solids| f64::from(share(solids.middle(cell) / grid.dx as Real)))
 }
 
 /// The part of a cell that is on the lower side of a surface at this distance from its middle [cells].

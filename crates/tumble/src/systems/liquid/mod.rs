@@ -9,17 +9,24 @@
 //! tests: crates/tumble-f64/tests/liquid.rs.
 
 mod extend;
+mod flow;
 mod ledger;
 mod level;
 mod particles;
 mod pressure;
+mod relax;
+mod skin;
 mod splat;
 mod stencil;
 mod tank;
+mod tension;
+mod viscosity;
 
+pub use flow::{Inflow, Openings, Region};
 pub use particles::Particles;
 pub use pressure::Accuracy;
 pub use tank::{Settings, Tank, Transfer};
+pub use tension::longest;
 
 use crate::exchange::Turn;
 use crate::integrators::equal_steps;
@@ -77,6 +84,7 @@ impl System for Liquid {
         let mut report = StepReport::default();
         for i in 0..self.tanks.len() {
             self.tanks[i].take_surfaces(exchange.surfaces());
+            self.tanks[i].listen(t, exchange);
             let mut done = 0.0;
             while dt - done > 1e-9 * dt {
                 if !go_on() {
@@ -96,6 +104,7 @@ impl System for Liquid {
                     return Err(error);
                 }
             }
+            self.tanks[i].tell(exchange);
         }
         Ok(report)
     }
@@ -103,7 +112,14 @@ impl System for Liquid {
     fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
 
     fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
-        self.tanks.iter().for_each(|tank| tank.columns(names, out));
+        for tank in &self.tanks {
+            tank.columns(names, out);
+            tank.skin_columns(names, out);
+            tank.cell_columns(names, out);
+        }
+        if names.contains(&"force") {
+            out.extend(self.tanks.iter().flat_map(Tank::forces_on));
+        }
     }
 
     fn topology(&self, out: &mut Vec<Column>) {

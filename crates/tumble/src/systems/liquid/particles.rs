@@ -1,7 +1,7 @@
 //! The particles of a liquid, sorted by cell.
 
 use crate::math::Real;
-use crate::math::parallel::chunks;
+use crate::math::parallel::{CHUNK, Tasks, chunks};
 
 /// Gradients of a velocity: how much each component grows along each axis over a cell [m/s].
 pub type Gradient = [[Real; 3]; 3];
@@ -15,6 +15,7 @@ pub struct Particles {
     pub v: Vec<[Real; 3]>,
     /// Gradients of the velocities around them; none where the transfer has none.
     pub gradient: Vec<Gradient>,
+    affine: bool,
     /// Numbers, which they keep.
     pub id: Vec<u32>,
     /// The first particle of each cell, and one past the last.
@@ -28,7 +29,17 @@ impl Particles {
     /// Particles at these places [cells] with these velocities [m/s].
     pub fn new(x: Vec<[Real; 3]>, v: Vec<[Real; 3]>, affine: bool) -> Self {
         let gradient = if affine { vec![Gradient::default(); x.len()] } else { Vec::new() };
-        Self { id: (0..x.len() as u32).collect(), x, v, gradient, ..Self::default() }
+        Self { id: (0..x.len() as u32).collect(), x, v, gradient, affine, ..Self::default() }
+    }
+
+    /// Whether they have gradients.
+    pub fn is_affine(&self) -> bool {
+        self.affine
+    }
+
+    /// Takes numbers, places, velocities and gradients anew.
+    pub fn put(&mut self, id: Vec<u32>, x: Vec<[Real; 3]>, v: Vec<[Real; 3]>, gradient: Vec<Gradient>) {
+        (self.id, self.x, self.v, self.gradient) = (id, x, v, gradient);
     }
 
     /// How many there are.
@@ -43,7 +54,7 @@ impl Particles {
 
     /// Sorts them by the cells of a box.
     pub fn sort(&mut self, n: [usize; 3]) {
-        let Self { x, v, gradient, id, starts, cells, order, spare } = self;
+        let Self { x, v, gradient, id, starts, cells, order, spare, .. } = self;
         cells.resize(x.len(), 0);
         chunks(cells, |start, cells| {
             for (cell, x) in cells.iter_mut().zip(&x[start..]) {
@@ -75,9 +86,38 @@ impl Particles {
         }
     }
 
-    /// The row of each particle, by its number.
+    /// Adds one with this number, to be sorted.
+    pub fn add(&mut self, x: [Real; 3], v: [Real; 3], id: u32) {
+        self.x.push(x);
+        self.v.push(v);
+        if self.affine {
+            self.gradient.push(Gradient::default());
+        }
+        self.id.push(id);
+    }
+
+    /// Keeps those at places [cells] that `keep` says, to be sorted.
+    pub fn retain(&mut self, keep: impl Fn(&[Real; 3]) -> bool + Sync + Send) {
+        let kept: Vec<bool> = self.x.chunks(CHUNK).map_in_parallel(|x| x.iter().map(&keep).collect::<Vec<_>>()).concat();
+        fn sift<T>(column: &mut Vec<T>, kept: &[bool]) {
+            let mut kept = kept.iter();
+            column.retain(|_| kept.next().copied().unwrap_or(true));
+        }
+        sift(&mut self.x, &kept);
+        sift(&mut self.v, &kept);
+        sift(&mut self.gradient, &kept);
+        sift(&mut self.id, &kept);
+    }
+
+    /// The rows of all particles, in the order of their numbers.
     pub fn rows(&self) -> Vec<u32> {
-        let mut rows = vec![0; self.id.len()];
+        let n = self.id.len();
+        if self.id.iter().any(|id| *id as usize >= n) {
+            let mut rows: Vec<u32> = (0..n as u32).collect();
+            rows.sort_unstable_by_key(|row| self.id[*row as usize]);
+            return rows;
+        }
+        let mut rows = vec![0; n];
         self.id.iter().enumerate().for_each(|(row, id)| rows[*id as usize] = row as u32);
         rows
     }

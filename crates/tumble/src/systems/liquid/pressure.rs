@@ -3,6 +3,8 @@
 //! Between a cell with liquid and one without, the surface is the part theta of the way, and so
 //!   theta = phi_i/(phi_i - phi_j),   u_f -= (0 - q_i)/(theta dx),   d_i += w_f/theta                                       (pic.6)
 //!
+//! Where the surface is curved, the pressure on it is gamma kappa (pic.11), and q there h gamma kappa/rho.
+//!
 //! Source: [gibou2002]; theta is at least 1/100, so that a cell that the surface barely holds does not rule the matrix.
 
 use super::level::{Level, cell};
@@ -21,6 +23,8 @@ const LEAST: Real = 0.01;
 const INSIDE: Real = 0.08;
 /// The largest excess or lack of density that is removed at once.
 const MOST: Real = 0.5;
+/// Part of what solids take of a cell's space within which its density may be off.
+const UNSURE: Real = 0.5;
 /// Residual of the displacement, relative to the density's error.
 const DISPLACED: f64 = 1e-2;
 
@@ -96,13 +100,31 @@ impl Matrix {
         self.solver.spare
     }
 
+    /// Makes bodies a part of it; `density` is that of the liquid [kg/m³].
+    pub fn join(&mut self, level: &Level, solids: &Solids, density: f64) {
+        self.solver.join(solids.joints(density, |cell| level.cells[cell as usize] == cell::LIQUID));
+    }
+
+    /// The pressure [m²/s, times the time] that a surface has by itself drives a velocity.                     (pic.11)
+    pub fn pull(&self, u: &mut Vectors, at_surface: &[Real]) {
+        let Some(scale) = u.parts.first().map(|part| (1.0 / part.grid.dx) as Real) else { return };
+        for (face, q) in self.surface.iter().zip(at_surface) {
+            u.parts[face.part].data[face.at as usize] -= face.sign * scale * face.inverse * q;
+        }
+    }
+
+    /// The cells beside each face to the surface, the one with liquid first, and the part of the way from there to the surface.
+    pub fn crossings(&self) -> impl Iterator<Item = ([u32; 2], Real)> {
+        self.surface.iter().map(|face| (face.cells, 1.0 / face.inverse))
+    }
+
     /// Makes a velocity at time t free of divergence in the liquid; h [s] is the time for which the pressure [Pa] acts.
     pub fn project(
         &mut self,
         u: &mut Vectors,
         pressure: &mut Field,
         level: &Level,
-        (solids, sides): (Option<&Solids>, &[[Beyond; 2]; 3]),
+        (mut solids, sides): (Option<&mut Solids>, &[[Beyond; 2]; 3]),
         (t, h, density): (f64, f64, f64),
         accuracy: Accuracy,
         report: &mut StepReport,
@@ -110,7 +132,8 @@ impl Matrix {
         hold(u, sides, t);
         solids.iter().for_each(|solids| solids.close(u));
         let grid = pressure.grid;
-        let speed = fastest(u, solids).max(solids.map_or(0.0, Solids::fastest_cut));
+        let speed = fastest(u, solids.as_deref()).max(solids.as_deref().map_or(0.0, Solids::fastest_cut));
+        let mass = density * solids.as_deref().map_or(0.0, Solids::area);
         // Walls that come closer press out what no pressure can hold.
         let params = Params {
             target: Target::Largest(accuracy.tolerance * grid.dx * speed),
@@ -122,14 +145,18 @@ impl Matrix {
         let scale = (density / h) as Real;
         let Self { solver, surface } = self;
         let mut correction = solver.spare.column(pressure.data.len());
-        let info = solver.refine(&mut correction, &params, |_, q, b| {
+        let info = solver.refine(&mut correction, &params, |solver, q, b| {
             if let Some(q) = q {
                 subtract(surface, u, q);
-                solids.iter().for_each(|solids| solids.close(u));
+                if let Some(solids) = &mut solids {
+                    solids.bodies.iter_mut().zip(solver.yielded(q)).for_each(|(body, product)| body.yield_to(&product, mass));
+                    solids.follow();
+                    solids.close(u);
+                }
                 chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += scale * q));
             }
             let mut left = Field { grid, place: Place::Cell, sides: Default::default(), unit: "m²/s".into(), data: std::mem::take(b) };
-            around(u, solids, None, &mut left);
+            around(u, solids.as_deref(), None, &mut left);
             keep_liquid(&mut left.data, level);
             *b = left.data;
         });
@@ -150,11 +177,12 @@ impl Matrix {
     }
 
     /// Displacements on faces [cells] after which the liquid is as dense as at rest;
-    /// `density` is relative to that at rest.                                                                    (pic.9)
+    /// `density` is relative to that at rest, in the `room` that solids leave.                                                                    (pic.9)
     pub fn displace(
         &mut self,
         density: &Field,
         level: &Level,
+        room: Option<&[Real]>,
         solids: Option<&Solids>,
         way: &mut Vectors,
         report: &mut StepReport,
@@ -168,7 +196,10 @@ impl Matrix {
                 let at = start + i;
                 // What a cell so far below a plane surface has of the density.
                 let above = (1.0 - INSIDE + level.distance.data[at]).clamp(0.0, 1.0);
-                *b = dx * (density.data[at] - 1.0 + 0.5 * above * above).clamp(-MOST, MOST);
+                let excess = density.data[at] - 1.0 + 0.5 * above * above;
+                // What solids leave of the space around a cell is known to some part.
+                let unsure = room.map_or(0.0, |room| UNSURE * (1.0 - room[at]).max(0.0));
+                *b = dx * (excess - excess.clamp(-unsure, unsure)).clamp(-MOST, MOST);
             }
         });
         keep_liquid(&mut b, level);

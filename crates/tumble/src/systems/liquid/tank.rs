@@ -1,12 +1,17 @@
 //! A liquid in its box: its state, and a step.
 
 use super::extend::{self, Marks, empty, extend, mark};
+use super::flow::Openings;
 use super::level::{Level, cell, share};
 use super::particles::{Gradient, Particles};
 use super::pressure::{Accuracy, Matrix};
+use super::relax::spread;
 use super::splat::{self, LEAST};
 use super::stencil::Sampler;
-use crate::fluids::{Beyond, Failure, Solids};
+use super::tension::{curvatures, longest};
+use super::viscosity::Viscosity;
+use crate::exchange::{Exchange, Turn};
+use crate::fluids::{Beyond, Failure, Immersed, Solids};
 use crate::forces::Gravity;
 use crate::geometry::Collider;
 use crate::math::parallel::{CHUNK, Tasks, chunks, fold};
@@ -40,6 +45,16 @@ pub enum Transfer {
 pub struct Settings {
     /// Density [kg/m³].
     pub density: f64,
+    /// Dynamic viscosity [Pa s].
+    pub viscosity: f64,
+    /// Surface tension [N/m].
+    pub tension: f64,
+    /// Whether it sticks to solids and sides, or slips along them.
+    pub stick: bool,
+    /// Particles along each edge of a cell at the start.
+    pub sampling: u32,
+    /// Whether frames have its surface.
+    pub surface: bool,
     /// Volume of a particle [cells].
     pub particle: f64,
     /// How velocities go from particles to the grid and back.
@@ -68,6 +83,8 @@ pub struct Tank {
     pub pressure: Field,
     /// The last step [s]; 0 at the start.
     pub last: f64,
+    /// Where it comes in and leaves.
+    pub openings: Openings,
     pub(super) level: Level,
     pub(super) solids: Option<Solids>,
     grid: Grid,
@@ -91,9 +108,17 @@ pub struct Tank {
 
 impl Tank {
     /// A liquid of these particles around these solids, which are where they are at t = 0.
-    pub fn new(name: String, settings: Settings, grid: Grid, solids: Option<Solids>, particles: Particles) -> Result<Self, GridError> {
+    pub fn new(
+        name: String,
+        settings: Settings,
+        grid: Grid,
+        solids: Option<Solids>,
+        particles: Particles,
+        openings: Openings,
+    ) -> Result<Self, GridError> {
         let mut tank = Self {
             name,
+            openings: Openings { next: particles.count() as u32, ..openings },
             particles,
             pressure: Field::new(grid, Place::Cell, "Pa")?,
             last: 0.0,
@@ -153,6 +178,23 @@ impl Tank {
         }
     }
 
+    /// Takes the state of what it moves.
+    pub fn listen(&mut self, t: f64, exchange: &Exchange) {
+        let (gravity, grid) = (self.settings.gravity.at(t), self.grid);
+        // The weight of what it displaces is in its pressure.
+        self.bodies().iter_mut().for_each(|body| body.listen(exchange, gravity, 0.0, &grid));
+    }
+
+    /// Gives what it moves what it has got.
+    pub fn tell(&mut self, exchange: &mut Turn<'_>) {
+        self.bodies().iter_mut().for_each(|body| body.tell(exchange));
+    }
+
+    /// Solids that it moves.
+    pub(super) fn bodies(&mut self) -> &mut [Immersed] {
+        self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
+    }
+
     /// What follows from where the solids are.
     fn settle(&mut self) {
         let open = self.solids.as_ref().map(|solids| &solids.open);
@@ -181,7 +223,8 @@ impl Tank {
             self.particles.v[range].iter().flatten().fold(0.0, worse)
         };
         let particles = fold(self.particles.count(), most).into_iter().fold(0.0, |a: Real, b| if a >= b || a.is_nan() { a } else { b });
-        f64::from(particles).max(self.solids.as_ref().map_or(0.0, Solids::fastest_cut))
+        let solids = self.solids.as_ref().map_or(0.0, |solids| solids.fastest_cut().max(solids.fastest()));
+        f64::from(particles).max(solids)
     }
 
     /// The largest step [s] of the Courant number at time t, within `left` [s]: gravity speeds it up on the way.
@@ -190,14 +233,20 @@ impl Tank {
         let g = self.settings.gravity.at(t).iter().map(|g| g * g).sum::<f64>().sqrt();
         // The second half h with all of its gravity: (v + 2 h g) h = way.
         let half = if speed > 0.0 || g > 0.0 { 2.0 * way / (speed + (speed * speed + 8.0 * g * way).sqrt()) } else { left };
-        (2.0 * half).min(left)
+        let bears = if self.settings.tension > 0.0 { longest(self.settings.density, self.settings.tension, self.grid.dx) } else { left };
+        (2.0 * half).min(left).min(bears)
     }
 
     /// One step of h seconds from t to `end` [s]: in the first half, without forces, the pressure acts twice.             (pic.7)
     pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Failure> {
         self.last = h;
+        let before = (!self.bodies().is_empty()).then(|| self.pressure.clone());
         self.half((t, t + 0.5 * h), h, false, report)?;
         let first = self.pressure.data.clone();
+        if let (Some(solids), Some(before)) = (&mut self.solids, &before) {
+            let cells = &self.level.cells;
+            solids.lift(h, before, |at| cells[at as usize] == cell::LIQUID);
+        }
         self.half((t + 0.5 * h, end), h, true, report)?;
         chunks(&mut self.pressure.data, |start, p| p.iter_mut().zip(&first[start..]).for_each(|(p, first)| *p += 2.0 * first));
         Ok(())
@@ -209,23 +258,58 @@ impl Tank {
         report.passed(self.fastest() * half / self.grid.dx);
         let mut matrix = Matrix::new(&self.level, self.solids.as_ref(), &self.sides, std::mem::take(&mut self.spare))?;
         if self.settings.keep_volume {
-            matrix.displace(&self.crowd, &self.level, self.solids.as_ref(), &mut self.way, report)?;
+            matrix.displace(&self.crowd, &self.level, self.room.as_deref(), self.solids.as_ref(), &mut self.way, report)?;
         }
         self.give_to_grid();
+        let bodies: Vec<_> = self.bodies().iter().map(Immersed::before).collect();
         if second {
-            self.accelerate(from, h);
+            self.accelerate(from, h, &matrix);
         }
-        let Self { u, pressure, level, solids, sides, settings, .. } = self;
-        matrix.project(u, pressure, level, (solids.as_ref(), sides), (to, h, settings.density), settings.accuracy, report)?;
+        if let Some(solids) = &self.solids {
+            matrix.join(&self.level, solids, self.settings.density);
+        }
+        self.project(&mut matrix, (to, h), report)?;
+        if second && self.settings.viscosity > 0.0 {
+            // What the pressure balances does not slip before viscosity holds it.
+            let Settings { viscosity, density, stick, .. } = self.settings;
+            let viscous = Viscosity::new(&self.level, self.solids.as_ref(), stick, viscosity / density, h);
+            viscous.act(&mut self.u, report);
+            let before = self.pressure.data.clone();
+            self.project(&mut matrix, (to, h), report)?;
+            chunks(&mut self.pressure.data, |start, p| p.iter_mut().zip(&before[start..]).for_each(|(p, before)| *p += before));
+        }
         self.spare = matrix.into_spare();
         self.reach_out(half);
-        self.give_to_particles(second);
+        let ways = (second && self.settings.keep_volume)
+            .then(|| spread(&self.particles, self.grid.n, (1.0 / f64::from(self.settings.sampling)) as Real));
+        self.give_to_particles(ways.as_deref(), second, 0.5 * (from + to), half);
+        self.bodies().iter_mut().for_each(|body| body.advance(half));
+        if !second {
+            self.bodies().iter_mut().zip(&bodies).for_each(|(body, before)| body.reflect(before));
+        }
         if self.solids.as_ref().is_some_and(Solids::moves) {
             self.put(to);
+        }
+        if self.openings.any() {
+            let Self { openings, particles, settings, grid, solids, .. } = self;
+            openings.exchange(particles, (0.5 * (from + to), half), settings.sampling, grid, solids.as_ref());
         }
         self.push_out();
         self.prepare();
         Ok(())
+    }
+
+    /// Makes the velocity at a time [s] free of divergence, with a pressure that acts for h seconds.
+    fn project(&mut self, matrix: &mut Matrix, (t, h): (f64, f64), report: &mut StepReport) -> Result<(), Failure> {
+        let Self { u, pressure, level, solids, sides, settings, .. } = self;
+        matrix.project(u, pressure, level, (solids.as_mut(), sides), (t, h, settings.density), settings.accuracy, report)
+    }
+
+    /// The velocity of its particles at faces [m/s]; zero where there are none.
+    pub fn face_velocities(&self) -> Vectors {
+        let (mut u, mut weights) = (self.u.clone(), self.weights.clone());
+        splat::to_faces(&self.particles, &mut u, &mut weights);
+        u
     }
 
     /// Velocities of particles to faces.
@@ -240,9 +324,11 @@ impl Tank {
         }
     }
 
-    /// Gravity for h seconds.
-    fn accelerate(&mut self, t: f64, h: f64) {
-        let gravity = self.settings.gravity.at(t);
+    /// Gravity, surface tension and what else moves bodies, for h seconds.
+    fn accelerate(&mut self, t: f64, h: f64, matrix: &Matrix) {
+        let (gravity, grid) = (self.settings.gravity.at(t), self.grid);
+        self.bodies().iter_mut().for_each(|body| body.fall(h, gravity, 0.0, &grid));
+        self.solids.iter_mut().for_each(Solids::follow);
         for ((part, marks), axis) in self.u.parts.iter_mut().zip(&self.reached).zip(self.grid.axes()) {
             let gain = (h * gravity[axis]) as Real;
             if gain != 0.0 {
@@ -250,6 +336,12 @@ impl Tank {
                     u.iter_mut().zip(&marks[start..]).filter(|(_, mark)| **mark == mark::KNOWN).for_each(|(u, _)| *u += gain);
                 });
             }
+        }
+        let Settings { tension, density, .. } = self.settings;
+        if tension > 0.0 {
+            let scale = (h * tension / (density * grid.dx)) as Real;
+            let q: Vec<Real> = curvatures(&self.level, matrix).into_iter().map(|kappa| scale * kappa).collect();
+            matrix.pull(&mut self.u, &q);
         }
     }
 
@@ -307,8 +399,10 @@ impl Tank {
     }
 
     /// Velocities of faces to particles, which then go their way.                                               (pic.2, pic.3)
-    fn give_to_particles(&mut self, second: bool) {
-        let Self { particles, u, way, before, settings, solids, grid, .. } = self;
+    fn give_to_particles(&mut self, ways: Option<&[[Real; 3]]>, second: bool, t: f64, half: f64) {
+        let Self { particles, u, way, before, settings, solids, grid, openings, .. } = self;
+        let comes_in = openings.velocity(t, grid);
+        let (comes_in, pace) = (&comes_in, (half / grid.dx) as Real);
         let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
         let Particles { x, v, gradient, .. } = particles;
         let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
@@ -316,8 +410,14 @@ impl Tank {
         // What the pressure has changed counts twice in the first half.
         let more = if second { 0.0 } else { 1.0 };
         let tasks = x.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)).zip(gradients);
-        tasks.in_parallel(|((x, v), mut gradient): ((_, _), Option<&mut [Gradient]>)| {
+        tasks.enumerate().in_parallel(|(task, ((x, v), mut gradient)): (_, ((_, _), Option<&mut [Gradient]>))| {
             for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                if let Some(given) = comes_in(x) {
+                    (0..3).for_each(|a| x[a] = (x[a] + pace * given[a]).max(SIDE).min(tops[a]));
+                    *v = given;
+                    gradient.iter_mut().for_each(|gradient| gradient[i] = Gradient::default());
+                    continue;
+                }
                 let carried = |new: Real, old: Real| new + more * (new - old);
                 if let Some(gradient) = &mut gradient {
                     let ((new, slope), (old, before)) = (velocity.with_gradient(x), before.with_gradient(x));
@@ -329,7 +429,8 @@ impl Tank {
                     *v = std::array::from_fn(|a| carried(new[a], old[a]) + ratio * (v[a] - old[a]));
                 }
                 // Straight on: what goes its way with its own velocity keeps its angular momentum.
-                let all = way.read(x);
+                let mut all = way.read(x);
+                ways.iter().for_each(|ways| (0..3).for_each(|a| all[a] += ways[task * CHUNK + i][a]));
                 let strides = solids.as_ref().map_or(1, |solids| strides(solids, grid, x, &all));
                 for _ in 0..strides {
                     for a in grid.axes() {
