@@ -307,9 +307,9 @@ class World:
         """Sets position [m] or velocity [m/s], n x 3, of an object. Raises SceneError."""
 
 def write_vdb(volumes: Sequence[Mapping[str, Any]], zip: bool) -> bytes:
-    """The bytes of a VDB file. Each volume is a dict: name, unit, class ("unknown", "fog volume", "level set" or "staggered"), values
-    (float32, x fastest, those of a vector together), width, points, corner, spacing [m], origin [m], background, tolerance,
-    half. Raises ExportError."""
+    """The bytes of a VDB file. Each volume is a dict: name, unit, class ("unknown", "fog volume", "level set" or "staggered"),
+    values (float32, x fastest, those of a vector together), width, points, corner, spacing [m], origin [m], background,
+    tolerance, half. Raises ExportError."""
 
 def load_fabric(fabric: Path) -> dict[str, Any]:
     """The record of a shipped fabric by name, or of a .toml or .json file: name, composition, source, density [kg/m²],

@@ -163,8 +163,8 @@ def to_pandas(run: Stored, thing: str | None = None, columns: Iterable[str] | No
 
 def to_xarray(run: Stored, things: Iterable[str] | None = None, columns: Iterable[str] | None = None) -> Any:
     """An xarray.Dataset of the ledger (`energy`) and of the columns of objects (`rope.position`) over time, all of those named
-    or all but surfaces of liquids, which are other meshes in each frame, with units and meanings in `attrs`. Particles that come and go have a coordinate `NAME.id`, and nan in
-    frames in which they do not live. Raises ExportError."""
+    or all but surfaces of liquids (other meshes in each frame), with units and meanings in `attrs`. Particles that come and go
+    have a coordinate `NAME.id`, and nan in frames in which they do not live. Raises ExportError."""
     xarray = library("xarray", "to_xarray")
     there = {name: _in_frames(run, name) for name in run.columns if _in_frames(run, name)}
     wanted = [name for name in there if not _made_anew(run, name)] if things is None else list(things)

@@ -224,7 +224,8 @@ def dam(
 ) -> None:
     """Break the same dam by every method for liquids: pictures, front against the experiment, energy, volume, cost.
 
-    PIC, FLIP and APIC, which are particles and a grid, and position-based particles by themselves. It takes about half a minute.
+    PIC, FLIP and APIC, which are particles and a grid, and position-based particles by themselves. It takes about half a
+    minute.
 
     \b
     Examples:

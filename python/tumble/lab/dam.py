@@ -33,8 +33,13 @@ CELLS = 64
 """Along the tank."""
 
 MEASURED = np.array(
-    [(0.0920, 1.128), (0.1907, 1.244), (0.2663, 1.464), (0.3221, 1.695), (0.3681, 1.903), (0.4140, 2.123)]
-    + [
+    [
+        (0.0920, 1.128),
+        (0.1907, 1.244),
+        (0.2663, 1.464),
+        (0.3221, 1.695),
+        (0.3681, 1.903),
+        (0.4140, 2.123),
         (0.4466, 2.365),
         (0.4958, 2.584),
         (0.5219, 2.804),
@@ -133,8 +138,9 @@ def run(method: Method, cells: int) -> Course:
         behind = x[x[:, 0] < 4 * spacing, 2]
         course.heights.append(float(np.quantile(behind, 0.95)) / 0.95 if len(behind) else 0.0)
         course.energies.append(float(books["energy"]))
-        if books.get("volume"):
-            course.volumes.append(float(books["volume"]))
+        volume = books["volume"]
+        if volume is not None and np.isfinite(volume):
+            course.volumes.append(float(volume))
         if round(world.time * FPS) in shown:
             v = np.asarray(world.frame["water"]["velocity"], dtype=float)
             course.pictures.append((x, np.linalg.norm(v, axis=1)))
@@ -160,8 +166,8 @@ def page(folder: Path, cells: int = CELLS, progress: Callable[[int, int], None] 
     sections = [
         Section(
             "What it looks like",
-            f"<p>A column of {COLUMN[0]:g} m x {COLUMN[1]:g} m falls in a tank of {LENGTH:g} m, with {cells} cells along it, or "
-            "particles as far apart as those in cells. A row for each method, a column for each time; light is fast.</p>",
+            f"<p>A column of {COLUMN[0]:g} m x {COLUMN[1]:g} m falls in a tank of {LENGTH:g} m, with {cells} cells along it, "
+            "or particles as far apart as those in cells. A row for each method, a column for each time; light is fast.</p>",
             partial(_pictures, courses=courses),
             1.75 * len(courses),
             "The water of each method at some times",
@@ -169,17 +175,18 @@ def page(folder: Path, cells: int = CELLS, progress: Callable[[int, int], None] 
         ),
         Section(
             "Front and height",
-            "<p>Left: how far the water has come along the floor, against the experiment of Koshizuka and Oka (1996), later by the "
-            "time that its gate takes. Without friction along the floor a front is up to a tenth ahead. Right: the height of the "
-            "water at the wall that it leaves, for which there is no measurement here.</p>",
+            "<p>Left: how far the water has come along the floor, against the experiment of Koshizuka and Oka (1996), later by "
+            "the time that its gate takes. Without friction along the floor a front is up to a tenth ahead. Right: the height "
+            "of the water at the wall that it leaves, for which there is no measurement here.</p>",
             partial(_fronts, courses=courses),
             4.2,
             "Front and height over time",
         ),
         Section(
             "What is kept",
-            "<p>Left: kinetic and potential energy. It may only fall: what a wave loses as it breaks is heat. Right: the volume "
-            "below the surface. Particles by themselves have no surface that would say it.</p>",
+            "<p>Left: kinetic and potential energy. A wave that breaks loses some as heat; what keeps the volume lifts "
+            "particles, and gives back a little. Right: the volume below the surface. Particles by themselves have no surface "
+            "that would say it.</p>",
             partial(_kept, courses=courses),
             4.2,
             "Energy and volume over time",
@@ -208,7 +215,8 @@ def _point(course: Course) -> str:
     volume = f", volume {100 * (course.volumes[-1] - 1):+.1f} %" if course.volumes else ""
     return (
         f"<b>{course.method.title}</b>: front {ratio.min():.2f} to {ratio.max():.2f} of the measured one, "
-        f"{100 * course.energies[-1]:.0f} % of the energy left after {SECONDS:g} s{volume}; {course.cost:.2g} s for a simulated second."
+        f"{100 * course.energies[-1]:.0f} % of the energy left after {SECONDS:g} s{volume}; "
+        f"{course.cost:.2g} s for a simulated second."
     )
 
 

@@ -38,8 +38,11 @@ const FLIP: f64 = 0.97;
 
 /// Numbers for a cell: velocities three times with weights and ways, pressure, surface, density, and a solver that is made anew.
 const CELL: f64 = 40.0;
+/// Numbers for a cell of the matrix of viscosity and of its solver, and for the curvature of the surface.
+const VISCOUS: f64 = 31.0;
+const CURVED: f64 = 2.0;
 /// Numbers for a particle: its rows twice, and a snapshot.
-const PARTICLE: f64 = 60.0;
+const PARTICLE: f64 = 63.0;
 
 pub struct Rules;
 
@@ -124,7 +127,11 @@ impl MethodRules for Rules {
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
         let flat = flat(scene);
-        let of = |thing: &Liquid| CELL * cells(&thing.cells, flat) + PARTICLE * per_cell(thing, flat) * fill_cells(thing, flat);
+        let of = |thing: &Liquid| {
+            let viscous = if thing.viscosity > 0.0 { VISCOUS } else { 0.0 };
+            let curved = if thing.surface_tension > 0.0 { CURVED } else { 0.0 };
+            (CELL + viscous + curved) * cells(&thing.cells, flat) + PARTICLE * per_cell(thing, flat) * fill_cells(thing, flat)
+        };
         scene.liquid.iter().map(of).sum::<f64>() * size_of::<Real>() as f64
     }
 

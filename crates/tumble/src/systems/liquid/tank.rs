@@ -30,6 +30,9 @@ const GAP: Real = 0.05;
 /// Parts of a cell in which particles go near solids; walls count as two cells thick.
 const STRIDES: Real = 4.0;
 
+/// Change of a velocity by the pressure of half a step, over it, from which it is a blow.
+const BLOW: Real = 0.5;
+
 /// How velocities go from particles to the grid and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Transfer {
@@ -407,8 +410,12 @@ impl Tank {
         let Particles { x, v, gradient, .. } = particles;
         let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
         let tops = grid.n.map(|n| n as Real - SIDE);
-        // What the pressure has changed counts twice in the first half.
-        let more = if second { 0.0 } else { 1.0 };
+        // What the pressure has changed counts twice in the first half, but for blows, which it would give back.
+        let more = |new: &[Real; 3], old: &[Real; 3]| {
+            let square = |v: &dyn Fn(usize) -> Real| (0..3).map(|a| v(a) * v(a)).sum::<Real>();
+            let blow = square(&|a| new[a] - old[a]) > BLOW * BLOW * square(&|a| old[a]);
+            if second || blow { 0.0 } else { 1.0 }
+        };
         let tasks = x.chunks_mut(CHUNK).zip(v.chunks_mut(CHUNK)).zip(gradients);
         tasks.enumerate().in_parallel(|(task, ((x, v), mut gradient)): (_, ((_, _), Option<&mut [Gradient]>))| {
             for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
@@ -418,15 +425,17 @@ impl Tank {
                     gradient.iter_mut().for_each(|gradient| gradient[i] = Gradient::default());
                     continue;
                 }
-                let carried = |new: Real, old: Real| new + more * (new - old);
                 if let Some(gradient) = &mut gradient {
                     let ((new, slope), (old, before)) = (velocity.with_gradient(x), before.with_gradient(x));
+                    let more = more(&new, &old);
+                    let carried = |new: Real, old: Real| new + more * (new - old);
                     *v = std::array::from_fn(|a| carried(new[a], old[a]));
                     gradient[i] = std::array::from_fn(|a| std::array::from_fn(|b| carried(slope[a][b], before[a][b])));
                 } else {
                     let (new, old) = (velocity.read(x), before.read(x));
+                    let more = more(&new, &old);
                     let ratio = if let Transfer::Flip(ratio) = settings.transfer { ratio as Real } else { 0.0 };
-                    *v = std::array::from_fn(|a| carried(new[a], old[a]) + ratio * (v[a] - old[a]));
+                    *v = std::array::from_fn(|a| new[a] + more * (new[a] - old[a]) + ratio * (v[a] - old[a]));
                 }
                 // Straight on: what goes its way with its own velocity keeps its angular momentum.
                 let mut all = way.read(x);
