@@ -1,5 +1,7 @@
 """Flow, density and speed at gates: against closed forms, and against PedPy on the files that it reads."""
 
+import csv
+import json
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -8,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 from test_bottlenecks import tree
+from typer.testing import CliRunner
 
 from tumble import Scene, SceneError
 from tumble.bottlenecks import measures, paths
 from tumble.bottlenecks.paths import Walk
+from tumble.cli import application
 
 # A room, and a corridor of 1 m behind its mouth.
 WALLS = [[14, 2], [8, 2], [8, 0], [0, 0], [0, 5], [8, 5], [8, 3], [14, 3]]
@@ -86,6 +90,19 @@ def test_files_hold_the_ways(tmp_path: Path) -> None:
         assert all(abs(length - 1.0) < 1e-9 or length == 0.0 for (length,) in lengths)
     with pytest.raises(SceneError, match=r"expected \.txt, \.sqlite"):
         paths.form(Path("a.csv"))
+
+
+def test_the_command_line_writes_ways_and_measures(tmp_path: Path) -> None:
+    (tmp_path / "room.json").write_text(json.dumps(room(12).to_dict()))
+    command = ["bottlenecks", str(tmp_path / "room.json"), "--seeds", "1", "--out", str(tmp_path / "out")]
+    said = CliRunner().invoke(application(), [*command, "--trajectories", str(tmp_path / "a.txt")])
+    assert said.exit_code == 0, said.output
+    with (tmp_path / "out/gates.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["gate"] for row in rows} == {"mouth", "out"}
+    assert [row["crossed"] for row in rows][-1] == "12" and max(float(row["density [1/m2]"]) for row in rows) > 0.5
+    wrong = CliRunner().invoke(application(), [*command, "--trajectories", "a.csv"])
+    assert wrong.exit_code == 2 and "expected .txt, .sqlite" in wrong.output
 
 
 @pytest.mark.long

@@ -335,7 +335,7 @@ def repair_mesh(path: Path) -> tuple[str | None, dict[str, int]]:
     SceneError if it cannot be read or nothing is left."""
 
 def plan(
-    source: bytes | Path, suffix: str, scale: float | None = None, layers: Sequence[tuple[str, str]] = ()
+    source: bytes | Path, suffix: str, scale: float | None = None, layers: Sequence[tuple[str, str]] | None = None
 ) -> dict[str, Any]:
     """The plan that a drawing shows, in units of the file: unit (name and metres, or None), scale [m], origin, walls, doors,
     exits, starts, stairs, layers, faults; span of its walls; plausible: whether it is the size of a building; likely: names

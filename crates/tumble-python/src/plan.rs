@@ -16,13 +16,13 @@ fn wrong(py: Python<'_>, text: String) -> PyErr {
 ///
 /// `source` is a path, or bytes; `suffix` is dxf, svg, geojson or wkt. `layers` are pairs of a kind and the name of a layer. Raises SceneError.
 #[pyfunction]
-#[pyo3(signature = (source, suffix, scale = None, layers = Vec::new()))]
+#[pyo3(signature = (source, suffix, scale = None, layers = None))]
 pub fn plan<'py>(
     py: Python<'py>,
     source: &Bound<'py, PyAny>,
     suffix: &str,
     scale: Option<f64>,
-    layers: Vec<(String, String)>,
+    layers: Option<Vec<(String, String)>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let suffixes = || Format::ALL.map(Format::suffix).join(", ");
     let format =
@@ -31,7 +31,7 @@ pub fn plan<'py>(
         let kinds = || Kind::ALL.map(Kind::name).join(", ");
         Kind::named(name).ok_or_else(|| wrong(py, format!("{name:?} is no kind of layers, expected one of {}", kinds())))
     };
-    let layers = layers.into_iter().map(|(name, layer)| Ok((kind(&name)?, layer))).collect::<PyResult<Vec<_>>>()?;
+    let layers = layers.unwrap_or_default().into_iter().map(|(name, layer)| Ok((kind(&name)?, layer))).collect::<PyResult<Vec<_>>>()?;
     let options = Options { scale, layers };
     let bytes = match source.cast::<PyBytes>() {
         Ok(bytes) => bytes.as_bytes().to_vec(),

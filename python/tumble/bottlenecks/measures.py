@@ -1,10 +1,12 @@
 """Flow, density and speed at a gate from the ways of people, as PedPy has them.
 
 N(t) counts who has crossed a line, each person once. The Voronoi cell of a person is what of the floor is nearer to it than to
-others and is joined to its place within the cell; its density is one over the area of that (steffen2010). Cells are counted on
-squares of SIDE: the error of a mean over some seconds is below 1 %.
+others and is joined to its place within the cell; its density is one over the area of that (crowds.8) [steffen2010]. Cells are
+counted on squares of SIDE: the error of a mean over some seconds is below 1 %.
 """
 
+import csv
+import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -117,10 +119,13 @@ class Ground:
             return owner
         best = np.full((ny, nx), self.reach * self.reach)
         for k, place in enumerate(places):
-            d = self.x - place
+            low = np.floor((place - self.reach - self.low) / self.side).astype(int).clip(0)
+            high = np.ceil((place + self.reach - self.low) / self.side).astype(int).clip(0)
+            part = (slice(low[1], high[1]), slice(low[0], high[0]))
+            d = self.x[part] - place
             far = d[..., 0] ** 2 + d[..., 1] ** 2
-            nearer = far < best
-            best[nearer], owner[nearer] = far[nearer], k
+            nearer = far < best[part]
+            best[part][nearer], owner[part][nearer] = far[nearer], k
         return np.where(self._joined(places, owner), owner, -1)
 
     def _joined(self, places: Floats, owner: npt.NDArray[np.int64]) -> Bools:
@@ -217,7 +222,7 @@ def series(walk: Walk, plan: Mapping[str, Any], stride: int) -> list[Series]:
     scale = float(plan["scale"])
     walls = [scale * np.array(wall, float) for wall in plan["walls"]]
     first, last = (int(walk.frame.min()), int(walk.frame.max())) if len(walk.frame) else (0, 0)
-    frames = np.arange(first, last + 1, stride)
+    frames = np.unique([*range(first, last + 1, stride), last])
     found = []
     for gate in [*plan["door"], *plan["exit"]]:
         line = scale * np.array([gate["from"], gate["to"]], float)
@@ -225,3 +230,14 @@ def series(walk: Walk, plan: Mapping[str, Any], stride: int) -> list[Series]:
         crossed = n_t(walk, line)[frames - first]
         found.append(Series(str(gate["name"]), frames / walk.fps, crossed, density, speed, flow(walk, line)))
     return found
+
+
+def table(found: Sequence[Series]) -> str:
+    """Of all gates as CSV: a line for each gate and time."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["gate", "time [s]", "crossed", "density [1/m2]", "speed [m/s]"])
+    for own in found:
+        rows = zip(own.times.tolist(), own.crossed.tolist(), own.density.tolist(), own.speed.tolist(), strict=True)
+        writer.writerows([own.gate, *row] for row in rows)
+    return text.getvalue()

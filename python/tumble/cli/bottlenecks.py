@@ -75,6 +75,8 @@ def bottlenecks(
     Türen or sortie are understood, too. In SVG a layer is the label, class or id of an element or a group, beside data-name,
     data-count and data-density; in GeoJSON the property kind or layer, beside name, count and density.
 
+    --trajectories also writes gates.csv: N(t), Voronoi density and speed at each gate, every second, as PedPy has them.
+
     The plan is checked first; what is wrong is drawn into check.png. --repair writes the mended scene into plan.json.
 
     \b
@@ -109,7 +111,7 @@ def bottlenecks(
                 found = study(scene, seeds, widen, first, limit, on, workers, None if json else _told)
                 written = report.write(found, folder)
                 if trajectories is not None:
-                    written.append(paths.write(paths.walked(scene, limit), trajectories))
+                    written += _ways(scene, limit, trajectories, folder)
     if check:
         _say_faults(faults, json)
     else:
@@ -150,6 +152,17 @@ def _checked(
         for fault in found if not check else ():
             warn("plan-fault", str(fault))
     return scene, found
+
+
+def _ways(scene: "Scene", limit: float, file: Path, folder: Path) -> list[Path]:
+    """Writes the ways of the first seed, and what is measured of them at each gate."""
+    from tumble.bottlenecks import measures, paths
+    from tumble.folder import write_whole
+
+    walk, tree = paths.walked(scene, limit), scene.to_dict()
+    found = measures.series(walk, tree["plan"][0], max(1, round(tree["time"]["fps"])))
+    write_whole(folder / "gates.csv", measures.table(found).encode())
+    return [paths.write(walk, file), folder / "gates.csv"]
 
 
 def _say_faults(found: "list[Fault]", json: bool) -> None:
