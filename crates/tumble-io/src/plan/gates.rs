@@ -66,7 +66,7 @@ fn swing(shape: &Shape, near: &[&Shape], walls: &[Vec<Point>]) -> Option<Line> {
 fn is_swing([centre, a, b]: [Point; 3], points: usize) -> bool {
     let (u, v) = (sub(a, centre), sub(b, centre));
     let turn = libm::atan2(cross(u, v), dot(u, v)).abs();
-    points > 2 && turn >= SWINGS[0] && turn <= SWINGS[1]
+    points > 2 && (SWINGS[0]..=SWINGS[1]).contains(&turn)
 }
 
 /// Whether a line is the leaf of an arc.

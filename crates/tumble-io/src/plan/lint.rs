@@ -344,7 +344,7 @@ pub(super) fn open_ends(walls: &[Vec<Point>]) -> Vec<(usize, usize, Point)> {
 /// Where the end of a wall is meant to be, if it is not there: at the nearest corner, or else on the nearest side, of other walls, or of its own but for the
 /// sides next to it.
 pub(super) fn gap(sides: &[Side], wall: usize, end: usize, x: Point, points: usize) -> Option<Point> {
-    let own = |side: &Side| side.wall == wall && (side.k + 1 == end || side.k == end || (points <= 3 && side.wall == wall));
+    let own = |side: &Side| side.wall == wall && (points <= 3 || side.k == end || side.k + 1 == end);
     let others = || sides.iter().filter(|side| !own(side) && off(side.line, x) <= TOUCH);
     let nearest = others().map(|side| off(side.line, x)).fold(f64::INFINITY, f64::min);
     if nearest <= SAME || nearest > TOUCH {
