@@ -262,6 +262,21 @@ fn every_fault_is_told_and_mended_where_that_is_said() {
 }
 
 #[test]
+fn a_plan_of_many_lines_is_looked_at_quickly() {
+    // A grid of 20,000 walls of 3 m, each of which ends 0.05 m before the next.
+    let wall = |k: usize| {
+        let (x, y) = (4.0 * (k % 100) as f64, 4.0 * (k / 200) as f64);
+        if k / 100 % 2 == 0 { vec![[x + 0.05, y], [x + 4.0, y]] } else { vec![[x, y + 0.05], [x, y + 4.0]] }
+    };
+    let big = Floor { walls: (0..20_000).map(wall).collect(), door: vec![], exit: vec![], start: vec![], radius: 0.18 };
+    let begin = std::time::Instant::now();
+    assert!(kinds(&big).contains(&"gap"));
+    let (mended, _) = repair(&big);
+    assert!(!kinds(&mended).contains(&"gap"));
+    assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
+}
+
+#[test]
 fn repair_leaves_a_plan_alone_that_is_right() {
     let (mended, done) = repair(&floor());
     assert_eq!((mended, done), (floor(), Vec::new()));

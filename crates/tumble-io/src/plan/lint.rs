@@ -6,7 +6,7 @@
 use super::{Point, bounds, cross, distance, foot, off, sub};
 use robust::{Coord, orient2d};
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 
 /// Ends of walls nearer than this [m] to another wall are meant to meet it.
 pub const TOUCH: f64 = 0.1;
@@ -24,6 +24,8 @@ const LEAN: f64 = 0.07;
 const CELLS: f64 = 4e6;
 /// Spans of plans [m].
 const SPANS: [f64; 2] = [1.0, 2000.0];
+/// Pieces of a wall that are sorted into squares, at most.
+const PIECES: f64 = 4000.0;
 /// Findings of a kind that are listed.
 pub const LISTED: usize = 50;
 
@@ -120,6 +122,44 @@ pub(super) fn sides(walls: &[Vec<Point>]) -> Vec<Side> {
     walls.iter().enumerate().flat_map(of).collect()
 }
 
+/// Sides by the square metres that they are in or near.
+pub(super) struct Near(HashMap<[i64; 2], Vec<usize>>);
+
+impl Near {
+    /// Of sides that are looked for from no further away than `reach` [m].
+    pub fn new(sides: &[Side], reach: f64) -> Self {
+        let mut squares: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+        for (i, side) in sides.iter().enumerate() {
+            let [a, b] = side.line;
+            // Piece by piece: the box around a long wall is mostly empty.
+            let pieces = distance(a, b).ceil().clamp(1.0, PIECES);
+            for k in 0..pieces as usize {
+                let ends = [k as f64 / pieces, (k + 1) as f64 / pieces].map(|s| super::between(a, b, s));
+                let [low, high] = bounds(&ends);
+                let (low, high) = (square(low.map(|x| x - reach)), square(high.map(|x| x + reach)));
+                for x in low[0]..=high[0].min(low[0] + 3) {
+                    for y in low[1]..=high[1].min(low[1] + 3) {
+                        let own = squares.entry([x, y]).or_default();
+                        if own.last() != Some(&i) {
+                            own.push(i);
+                        }
+                    }
+                }
+            }
+        }
+        Self(squares)
+    }
+
+    /// Numbers of sides that may be near a place.
+    pub fn at(&self, x: Point) -> &[usize] {
+        self.0.get(&square(x)).map_or(&[], Vec::as_slice)
+    }
+}
+
+fn square(x: Point) -> [i64; 2] {
+    x.map(|x| x.floor() as i64)
+}
+
 /// Calls `look` with all pairs of sides that are nearer than `reach` along both axes, the first of lower number.
 pub(super) fn pairs(sides: &[Side], reach: f64, mut look: impl FnMut(usize, usize)) {
     let low = |k: usize, a: usize| sides[k].line[0][a].min(sides[k].line[1][a]);
@@ -172,8 +212,8 @@ pub fn lint(floor: &Floor) -> Vec<Finding> {
     size(floor, &mut found);
     gates(floor, &sides, &mut found);
     pieces(floor, &sides, &mut found);
-    ends(floor, &sides, &mut found);
     if !found.0.iter().any(|finding| finding.kind == "size") {
+        ends(floor, &sides, &mut found);
         ways(floor, &sides, &mut found);
     }
     let mut found = found.0;
@@ -325,9 +365,10 @@ pub(super) fn is_sliver(wall: &[Point]) -> bool {
 
 /// Ends of open walls that nearly meet another wall.
 fn ends(floor: &Floor, sides: &[Side], found: &mut Findings) {
-    let mut gaps = Vec::new();
+    let (near, mut gaps) = (Near::new(sides, TOUCH), Vec::new());
     for (wall, end, x) in open_ends(&floor.walls) {
-        if gap(sides, wall, end, x, floor.walls[wall].len()).is_some() {
+        let own: Vec<Side> = near.at(x).iter().map(|i| sides[*i]).collect();
+        if gap(&own, wall, end, x, floor.walls[wall].len()).is_some() {
             gaps.push(x);
         }
     }

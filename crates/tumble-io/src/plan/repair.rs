@@ -1,6 +1,6 @@
 //! What can be mended of a plan without its author: [`super::lint`] says of which findings that holds.
 
-use super::lint::{Cure, Finding, Floor, JAMB, SAME, TOUCH, at, crossing, gap, is_sliver, open_ends, overlap, pairs, sides};
+use super::lint::{Cure, Finding, Floor, JAMB, Near, SAME, Side, TOUCH, at, crossing, gap, is_sliver, open_ends, overlap, pairs, sides};
 use super::{Point, between, distance, foot, off};
 use std::collections::BTreeMap;
 
@@ -130,10 +130,12 @@ fn without(walls: &[Vec<Point>], parts: &BTreeMap<(usize, usize), Vec<[f64; 2]>>
 
 /// Ends of walls moved to the walls that they are meant to meet.
 fn close(walls: &mut [Vec<Point>], done: &mut Vec<Finding>) {
-    let mut places = Vec::new();
+    let (all, mut places) = (sides(walls), Vec::new());
+    let near = Near::new(&all, 2.0 * TOUCH);
     for (wall, end, x) in open_ends(walls) {
-        // Anew for each end: the one that it meets may have moved.
-        let near: Vec<_> = sides(walls).into_iter().filter(|side| off(side.line, x) <= TOUCH).collect();
+        // As they are by now: the one that it meets may have moved.
+        let now = |i: &usize| Side { line: [walls[all[*i].wall][all[*i].k], walls[all[*i].wall][all[*i].k + 1]], ..all[*i] };
+        let near: Vec<Side> = near.at(x).iter().map(now).collect();
         if let Some(to) = gap(&near, wall, end, x, walls[wall].len()) {
             walls[wall][end] = to;
             places.push(x);
