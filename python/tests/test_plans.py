@@ -168,6 +168,23 @@ def test_units_are_asked_for_where_the_size_is_no_building(tmp_path: Path) -> No
         words(drawn(tmp_path), people=5, units="rod")
 
 
+def test_degrees_are_no_metres(tmp_path: Path) -> None:
+    tree = geojson()
+    for feature in tree["features"]:
+        text = json.dumps(feature["geometry"]["coordinates"])
+        feature["geometry"]["coordinates"] = degrees(json.loads(text))
+    (tmp_path / "a.geojson").write_text(json.dumps(tree))
+    with pytest.raises(SceneError, match="longitudes and latitudes"):
+        words(tmp_path / "a.geojson")
+
+
+def degrees(points: Any) -> Any:
+    """Metres to degrees, somewhere."""
+    return (
+        [degrees(p) for p in points] if isinstance(points[0], list) else [8.5 + 1e-5 * points[0], 50 + 1e-5 * points[1]]
+    )
+
+
 def mend(path: Path, old: int, new: int) -> Path:
     path.write_text(path.read_text().replace(f"\n{old}.0\n", f"\n{new}.0\n"))
     return path

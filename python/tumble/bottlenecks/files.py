@@ -27,6 +27,9 @@ NEEDED = ("wall", "exit", "start")
 FPS = 20
 """Frames a second of the scene."""
 
+DEGREES = 0.1
+"""Plans of a smaller span may be in degrees."""
+
 LISTED = 30
 """Layers that an error lists."""
 
@@ -154,6 +157,8 @@ def _size(found: Mapping[str, Any], reading: Reading) -> str:
         if unit
         else "in metres, as the file does not say its unit"
     )
+    if not found["likely"] and max(width, height) < DEGREES:
+        return f"walls span {width:.3g} by {height:.3g}: longitudes and latitudes? Export it in metres, in a projected system"
     text = f"walls span {scale * width:.4g} by {scale * height:.4g} m, {says}: that is no building"
     sizes = [f"--units {name} ({UNITS[name] * width:.4g} by {UNITS[name] * height:.4g} m)" for name in found["likely"]]
     return f"{text}; give the metres in a unit of it by --scale{', or ' if sizes else ''}{', '.join(sizes)}"
