@@ -102,8 +102,8 @@ fn each_format_gives_the_same_plan() {
             assert_eq!(found.doors[0].name.as_deref(), Some("office door"));
             assert_eq!(found.starts[0].count, Some(20.0));
         }
-        assert_eq!(found.is_plausible(metres), true, "{format:?}");
-        assert_eq!(found.is_plausible(0.001 * metres), false);
+        assert!(found.is_plausible(metres), "{format:?}");
+        assert!(!found.is_plausible(0.001 * metres), "{format:?}");
     }
 }
 
@@ -266,7 +266,7 @@ fn a_plan_of_many_lines_is_looked_at_quickly() {
     // A grid of 20,000 walls of 3 m, each of which ends 0.05 m before the next.
     let wall = |k: usize| {
         let (x, y) = (4.0 * (k % 100) as f64, 4.0 * (k / 200) as f64);
-        if k / 100 % 2 == 0 { vec![[x + 0.05, y], [x + 4.0, y]] } else { vec![[x, y + 0.05], [x, y + 4.0]] }
+        if (k / 100).is_multiple_of(2) { vec![[x + 0.05, y], [x + 4.0, y]] } else { vec![[x, y + 0.05], [x, y + 4.0]] }
     };
     let big = Floor { walls: (0..20_000).map(wall).collect(), door: vec![], exit: vec![], start: vec![], radius: 0.18 };
     let begin = std::time::Instant::now();
