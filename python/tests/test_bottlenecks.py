@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tumble import Scene, SceneError
-from tumble.bottlenecks import files, report, study
+from tumble.bottlenecks import passages, report, study
 from tumble.bottlenecks.walls import widened
 from tumble.cli import application
 
@@ -51,9 +51,24 @@ def test_the_narrow_door_costs_the_most_and_a_wider_one_saves() -> None:
 
 
 def test_numbers_do_not_depend_on_the_workers() -> None:
-    one, two = (study(Scene(tree(20)), seeds=2, workers=workers) for workers in (1, 2))
-    assert one.rows == two.rows
+    one, two = (study(Scene(tree(20)), seeds=2, widen=0.2, first=1, workers=workers) for workers in (1, 2))
+    assert one.rows == two.rows and one.widened == two.widened
     assert [run.last_out for run in one.outcomes] == [run.last_out for run in two.outcomes]
+
+
+def test_numbers_are_those_of_a_run_here_and_of_a_cluster() -> None:
+    scene = Scene(tree(10))
+    here = passages.run(scene, 1800.0)
+    for on in ("cores", "dask"):
+        (there,) = study(scene, seeds=1, on=on, workers=1).outcomes
+        assert (
+            passages.packed(there) == passages.packed(here) == passages.packed(passages.unpacked(passages.packed(here)))
+        )
+
+
+def test_a_run_that_cannot_be_computed_is_an_error() -> None:
+    with pytest.raises(SceneError, match="expected cores, dask"):
+        study(Scene(tree(5)), seeds=1, on="nowhere")
 
 
 def test_walls_that_end_at_a_door_move_with_its_jambs() -> None:
@@ -67,6 +82,21 @@ def test_walls_that_end_at_a_door_move_with_its_jambs() -> None:
     assert widened({**plan, "walls": [[[0, 0], [9, 0]]]}, "door", 0.4) is None
 
 
+def test_gates_that_cannot_be_made_wider_are_named(tmp_path: Path) -> None:
+    plan = tree(5)
+    # Set back from the walls that end before it.
+    plan["plan"][0]["exit"][0] |= {"from": [8.9, 1], "to": [8.9, 3]}
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    command = ["bottlenecks", str(tmp_path / "plan.json"), "--seeds", "1", "--widen", "0.2", "--out", str(tmp_path)]
+    said = CliRunner().invoke(application(), command)
+    assert said.exit_code == 0, said.output
+    assert (
+        "door wider by 0.2 m" in said.output
+        and "out was not made wider: no wall ends at both of its jambs" in said.output
+    )
+    assert "out was not made wider" in (tmp_path / "bottlenecks.html").read_text()
+
+
 def test_reports_hold_the_ranking(tmp_path: Path) -> None:
     found = study(Scene(tree(20)), seeds=2)
     written = report.write(found, tmp_path)
@@ -76,71 +106,6 @@ def test_reports_hold_the_ranking(tmp_path: Path) -> None:
     assert [row["gate"] for row in rows] == ["door", "out"]
     assert float(rows[0]["lost_mean [s]"]) == found.rows[0].lost.mean
     assert "<b>door</b> costs the most" in (tmp_path / "bottlenecks.html").read_text()
-
-
-def geojson() -> dict[str, Any]:
-    def feature(kind: str, form: str, points: Any, **words: Any) -> dict[str, Any]:
-        return {
-            "type": "Feature",
-            "properties": {"kind": kind, **words},
-            "geometry": {"type": form, "coordinates": points},
-        }
-
-    area = [[0.5, 0.5], [5, 0.5], [5, 3.5], [0.5, 3.5], [0.5, 0.5]]
-    features = [
-        *(feature("wall", "LineString", wall) for wall in WALLS),
-        feature("door", "LineString", [[6, 1.6], [6, 2.4]], name="door"),
-        feature("exit", "LineString", [[9, 1], [9, 3]], name="out"),
-        feature("start", "Polygon", [area], name="people", count=20),
-    ]
-    return {"type": "FeatureCollection", "features": features}
-
-
-SVG = """<svg xmlns="http://www.w3.org/2000/svg">
-<g id="walls"><path d="M600 -240 V-400 H0 V0 h600 v-160"/><polyline points="600,-400 900,-400 900,-300"/>
-<path d="m 600 0 h 300 v -100"/></g>
-<line class="door" x1="600" y1="-160" x2="600" y2="-240" data-name="door"/>
-<line class="exit" x1="900" y1="-100" x2="900" y2="-300" data-name="out"/>
-<polygon class="start" points="50,-50 500,-50 500,-350 50,-350" data-name="people"/></svg>"""
-
-
-def test_drawings_give_the_scene_that_they_show(tmp_path: Path) -> None:
-    (tmp_path / "a.geojson").write_text(json.dumps(geojson()))
-    (tmp_path / "a.svg").write_text(SVG)
-    expected = study(Scene(tree(20)), seeds=1)
-    for name, scale in (("a.geojson", 1.0), ("a.svg", 0.01)):
-        found = study(Scene(files.scene(tmp_path / name, scale, 20)), seeds=1)
-        for a, b in zip(found.rows, expected.rows, strict=True):
-            assert (a.gate, a.crossed) == (b.gate, b.crossed) and a.width == pytest.approx(b.width)
-        # The same room with the same people: what differs is round-off, which changes who goes first.
-        assert found.rows[0].lost.mean == pytest.approx(expected.rows[0].lost.mean, rel=0.3)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "told"),
-    [
-        ("a.geojson", "{}", "expected a FeatureCollection"),
-        ("a.geojson", "[", "Expecting value"),
-        ("a.geojson", '{"features": [null]}', "no wall in it"),
-        ("a.geojson", json.dumps(geojson()).replace("[6, 1.6]", "[6]"), "no list of points"),
-        ("a.geojson", json.dumps(geojson()).replace('"count": 20', '"count": "x"'), "is no number"),
-        ("a.svg", "<svg", "a.svg: "),
-        ("a.svg", SVG, "have no count; give one to each, or --people N"),
-        ("a.svg", SVG.replace("<g id", '<g transform="scale(2)" id'), "has a transform"),
-        ("a.svg", SVG.replace("V-400", "Q1 2 3 4"), "expected straight lines"),
-    ],
-)
-def test_drawings_that_cannot_be_read_say_why(tmp_path: Path, name: str, text: str, told: str) -> None:
-    (tmp_path / name).write_text(text)
-    with pytest.raises(SceneError) as error:
-        files.scene(tmp_path / name, 0.01 if name.endswith("svg") else 1.0, None)
-    assert told in str(error.value)
-
-
-def test_units_that_are_no_metres_are_asked_about(tmp_path: Path) -> None:
-    (tmp_path / "a.geojson").write_text(json.dumps(geojson()))
-    with pytest.raises(SceneError, match="give the metres in a unit of it by --scale"):
-        files.scene(tmp_path / "a.geojson", 0.01, None)
 
 
 def test_the_command_line_ranks_and_tells_who_is_left(tmp_path: Path) -> None:

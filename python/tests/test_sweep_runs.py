@@ -546,6 +546,8 @@ def test_messages_between_processes_come_back_as_they_were(tmp_path: Path) -> No
     found = task.Context.of(given.message())
     assert found.scene.to_dict() == given.scene.to_dict() and found.scene.folder == given.scene.folder
     assert (found.measures, found.folder, found.token) == (given.measures, given.folder, given.token)
+    asked = task.Context.of(task.Context(Scene(FLOCK), (), "", "", study="bottlenecks", words={"limit": 0.1}).message())
+    assert (asked.study, asked.words) == ("bottlenecks", {"limit": 0.1}) and not found.study
     one = task.Task("k", ("particles.p.name=Stäbe", "time.fps=0.1"), 7, True)
     assert task.Task.of(one.message()) == one
     values = {"a": 0.1 + 0.2, "b": -math.inf, "c": 5e-324}

@@ -334,6 +334,21 @@ def repair_mesh(path: Path) -> tuple[str | None, dict[str, int]]:
     triangles repeated, degenerate and turned, edges split, vertices unused, and of edges that are still open or odd. Raises
     SceneError if it cannot be read or nothing is left."""
 
+def plan(
+    source: bytes | Path, suffix: str, scale: float | None = None, layers: Sequence[tuple[str, str]] | None = None
+) -> dict[str, Any]:
+    """The plan that a drawing shows, in units of the file: unit (name and metres, or None), scale [m], origin, walls, doors,
+    exits, starts, stairs, layers, faults; span of its walls; plausible: whether it is the size of a building; likely: names
+    of units in which it is. `source` is a path or bytes, `suffix` dxf, svg, geojson or wkt, `layers` pairs of a kind (wall,
+    door, exit, start, stair) and the name of a layer. Raises SceneError."""
+
+def check_plan(floor: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What is wrong with a floor: dicts with kind, fatal, places [m], text, cure, and by ("repair" or "drawing"). A floor
+    has, in metres, walls, door and exit (each name, from, to), start (each name, points, people, exit) and radius."""
+
+def repair_plan(floor: Mapping[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """A floor as of `check_plan`, mended, and what was done, as there."""
+
 Side = Literal["closed"] | tuple[Literal["slope", "value", "ghost"], float]
 """Beyond a wall: no slope, a slope along the outward normal, a value at the wall, a value at the points beyond."""
 

@@ -1,5 +1,5 @@
 //! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; of a record, a [`Fabric`](tumble_interface::Fabric); and volumes in, bytes
-//! of a VDB file out ([`vdb`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
+//! of a VDB file out ([`vdb`]); of drawings floor plans ([`plan`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no unit is converted, and an axis turned
 //! in GLB only, which says where up is); a polygon becomes the fan of triangles around its first corner where that covers it, and others
@@ -14,6 +14,7 @@ mod build;
 mod fabric;
 mod glb;
 mod obj;
+pub mod plan;
 mod ply;
 mod polygon;
 mod skin;

@@ -4,6 +4,7 @@ mod arguments;
 mod arrays;
 mod errors;
 mod fields;
+mod plan;
 mod projection;
 mod scene;
 mod user;
@@ -21,6 +22,8 @@ mod _engine {
     use super::fields::{
         Field, Grid, advect, average, curl, diffuse, diffusion_limit, directional, divergence, gradient, laplacian, sample,
     };
+    #[pymodule_export]
+    use super::plan::{check_plan, plan, repair_plan};
     #[pymodule_export]
     use super::projection::{Projection, project};
     #[pymodule_export]

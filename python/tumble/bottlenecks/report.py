@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tumble.bottlenecks.runs import CELL, Findings, Rank, ends, gates
+from tumble.bottlenecks.passages import CELL, ends, gates
+from tumble.bottlenecks.runs import Findings, Rank
 from tumble.folder import write_whole
 from tumble.lab.page import Section, document, table
 from tumble.plots import settings
@@ -23,6 +24,9 @@ DOTS = 130.0
 
 WIDE = 9.0
 """Width of a picture [inch]."""
+
+FIXED = "no wall ends at both of its jambs"
+"""Why a gate is not made wider."""
 
 _LISTED = ("flow", "peak_flow", "peak_density", "waiting", "lost")
 
@@ -171,6 +175,7 @@ def _page(found: Findings) -> str:
     ]
     points += [f"made {w.by:g} m wider, {escape(w.gate)} would save {number(w.saved, 0)} person-seconds, and the last "
                f"be out {number(w.earlier, 1)} s earlier" for w in found.widened]  # fmt: skip
+    points += [f"{escape(gate)} was not made wider: {FIXED}" for gate in found.fixed]
     points += [f"with seed {seed} not all left in time" for seed in found.stuck]
     pictures = [("Ranked gates", "plan.png"), ("Waiting", "waiting.png"), ("Over time", "exits.png")]
     rows: Sequence[Sequence[str]] = [[str(k + 1), *map(escape, cells(row))] for k, row in enumerate(found.rows)]

@@ -41,6 +41,12 @@ SetOption = Annotated[
         "--set", metavar="KEY=VALUE", help="Override a key of the scene, e.g. time.fps=30 or sheet.flag.size='[1, 2]'."
     ),
 ]
+OnOption = Annotated[
+    str, typer.Option(metavar="ENGINE", help="cores, dask, or the address of a Dask scheduler: tcp://HOST:PORT.")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, metavar="N", help="Runs at a time.", show_default="as many as cores")
+]
 
 
 def title(file: Path) -> str:

@@ -49,12 +49,8 @@ def sweep(
     ] = None,
     set: find.SetOption = None,
     frames: find.FramesOption = None,
-    on: Annotated[
-        str, typer.Option(metavar="ENGINE", help="cores, dask, or the address of a Dask scheduler: tcp://HOST:PORT.")
-    ] = "cores",
-    workers: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Runs at a time.", show_default="as many as cores")
-    ] = None,
+    on: find.OnOption = "cores",
+    workers: find.WorkersOption = None,
     memory: Annotated[
         float | None, typer.Option(min=0.01, max=1e6, metavar="GB", help="The most memory that a run may take.")
     ] = None,

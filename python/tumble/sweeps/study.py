@@ -2,15 +2,14 @@
 
 import math
 import os
-import re
 import secrets
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, nullcontext, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from tumble import _engine
 from tumble._engine import ExportError, Scene, SceneError, TumbleError, World
@@ -20,15 +19,16 @@ from tumble.interrupts import held
 from tumble.lock import alone
 from tumble.recorder import machine, tier
 from tumble.sweeps import design as designs
+from tumble.sweeps import engines
 from tumble.sweeps import measures as measuring
 from tumble.sweeps import store as stores
 from tumble.sweeps import task as tasks
 from tumble.sweeps.against import Published, published
 from tumble.sweeps.design import Design, override
+from tumble.sweeps.engines import Engine, EngineWords
 from tumble.sweeps.measures import Measure
 from tumble.sweeps.mistakes import Mistakes
 from tumble.sweeps.options import Options
-from tumble.sweeps.pool import Pool, cores
 from tumble.sweeps.result import Row, Sweep, status_counts
 from tumble.sweeps.store import Store
 
@@ -44,8 +44,6 @@ LONG = 12 * 3600.0
 
 TIMED = 20
 """Runs of fewer than these are started at once, however long they take."""
-
-_ADDRESS = re.compile(r"(?:tcp|tls)://(?:[^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):([0-9]{1,5})")
 
 LAST_SEED = 2**32 - 1
 
@@ -81,21 +79,6 @@ class Plan:
     def large(self) -> bool:
         """Whether it should be asked about."""
         return self.runs - self.there >= MANY or self.seconds > LONG
-
-
-class Engine(Protocol):
-    """Where runs are computed."""
-
-    workers: int
-    deaths: int
-    """Workers that died."""
-
-    @property
-    def running(self) -> int:
-        """Runs that are being computed."""
-
-    def run(self, tasks: Iterable[tasks.Task]) -> Iterator[tasks.Answer]:
-        """Computes runs; answers come as they end."""
 
 
 @dataclass(frozen=True)
@@ -296,33 +279,9 @@ def _check_points(scene: Scene, design: Design, mistakes: Mistakes, places: Mapp
 # Planning
 
 
-@dataclass(frozen=True)
-class EngineWords:
-    """Where and how runs are computed."""
-
-    on: str
-    workers: int
-    threads: int
-
-
 def planned(words: Words, store: Store | None, options: Options) -> tuple[Plan, EngineWords]:
     """Looks at what is there, and estimates how long the rest will take. Raises SceneError."""
-    on, workers = options.on, options.workers
-    address = _ADDRESS.fullmatch(on)
-    if on not in ("cores", "dask") and (address is None or int(address[1]) > 65535):
-        raise wrong("--on", f"{on!r}, expected cores, dask or the address of a Dask scheduler such as tcp://host:8786")
-    if options.memory is not None and not (math.isfinite(options.memory) and options.memory >= 1e6):
-        raise wrong("memory", f"{options.memory!r}, expected a finite number >= 1e6 bytes")
-    n = cores()
-    chosen = n if workers is None else whole(workers, "--workers", 1)
-    chosen = max(1, min(chosen, words.runs))
-    notes = []
-    need, there = float(words.scene.memory), _memory()
-    if on == "cores" and need * chosen > 0.8 * there and workers is None:
-        fewer = max(1, int(0.8 * there / need))
-        if fewer < chosen:
-            notes.append(f"a run takes up to {need / 1e9:.3g} GB of {there / 1e9:.3g} GB: {fewer} of {chosen} workers")
-            chosen = fewer
+    engine, notes = engines.chosen(options.on, options.workers, words.runs, float(words.scene.memory), options.memory)
     done = 0
     if store is not None:
         keys = store.keys()
@@ -330,8 +289,8 @@ def planned(words: Words, store: Store | None, options: Options) -> tuple[Plan, 
     seconds = math.nan
     left = words.runs - done
     if left >= TIMED:
-        seconds = _estimate(words) * left / chosen
-    return Plan(words.runs, done, chosen, seconds, notes), EngineWords(on, chosen, max(1, n // chosen))
+        seconds = _estimate(words) * left / engine.workers
+    return Plan(words.runs, done, engine.workers, seconds, notes), engine
 
 
 def _estimate(words: Words) -> float:
@@ -344,14 +303,6 @@ def _estimate(words: Words) -> float:
             words.world.step(patience=5.0)
             taken += 1
     return (time.perf_counter() - begin) * frames / max(taken, 1)
-
-
-def _memory() -> float:
-    """Bytes that this machine has; inf where that is not known."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):
-        return math.inf
 
 
 # Running
@@ -496,15 +447,10 @@ class _Sweeping:
         return True
 
     def _engine(self) -> AbstractContextManager[Engine]:
-        words = self.engine_words
         context = tasks.Context(
             self.words.scene, tuple(self.words.measures), str(self.store.folder.resolve()), self.token
         )
-        if words.on == "cores":
-            return nullcontext(Pool(context, words.workers, words.threads, self.options.memory))
-        from tumble.sweeps.cluster import cluster
-
-        return cluster(context, words.on, words.workers, words.threads, self.options.memory)
+        return engines.opened(context, self.engine_words, self.options.memory)
 
     def _take(self, answer: tasks.Answer) -> None:
         """Keeps an answer. Raises ExportError where it cannot."""

@@ -1,6 +1,7 @@
 """One run of a sweep, where it is computed: in a worker on this machine, or on another."""
 
 import errno
+import importlib
 import io
 import json
 import re
@@ -36,6 +37,11 @@ FINISHED, EXPLODED, FAILED, INVALID, MEMORY, DIED = (
 that cannot be built; more memory than there is; a worker that died of it."""
 
 
+STUDIES = {"bottlenecks": "tumble.bottlenecks.passages"}
+"""Modules that look at runs in their own way: each has a function `outcome` of a scene and of words, which gives bytes. A
+message names one of these, never a module."""
+
+
 @dataclass(frozen=True)
 class Context:
     """What all runs of a sweep share; each worker gets it once."""
@@ -47,6 +53,9 @@ class Context:
     token: str
     """In the file `token` of that folder, by which a worker knows whether it sees it."""
     version: str = _engine.version
+    study: str = ""
+    """Which of STUDIES looks at the runs, with `words` of its own; none: only measures do."""
+    words: Mapping[str, float] = field(default_factory=dict)
 
     def message(self) -> bytes:
         """For a worker, as JSON: what comes from another machine is read, never run."""
@@ -57,6 +66,8 @@ class Context:
             "measures": [measure.name for measure in self.measures],
             "folder": self.folder,
             "token": self.token,
+            "study": self.study,
+            "words": dict(self.words),
         }
         return json.dumps(tree).encode()
 
@@ -68,7 +79,8 @@ class Context:
             text = f"a worker has tumble {_engine.version}, and this is {tree['version']}"
             raise Refused(f"{text}; install that version there")
         scene = Scene(tree["scene"], tree["home"] or None)
-        return Context(scene, tuple(map(measures.read, tree["measures"])), tree["folder"], tree["token"])
+        found = tuple(map(measures.read, tree["measures"]))
+        return Context(scene, found, tree["folder"], tree["token"], study=tree["study"], words=tree["words"])
 
 
 class Refused(Exception):
@@ -116,7 +128,7 @@ class Answer:
     seconds: float = 0.0
     """That computing it took."""
     archive: bytes = b""
-    """Its files, where the folder of the sweep is not seen."""
+    """Its files, where the folder of the sweep is not seen; or what a study found."""
     full: str = ""
     """Why its files could not be written: that ends the sweep."""
 
@@ -158,6 +170,9 @@ def perform(context: Context, task: Task) -> Answer:
 
 def _simulate(context: Context, task: Task, answer: Answer) -> None:
     scene = context.scene.replace(*task.sets)
+    if context.study:
+        answer.archive = importlib.import_module(STUDIES[context.study]).outcome(scene, context.words)
+        return
     moment = scene.to_dict()["time"]
     frames = int(moment["frames"])
     watch = measures.Watch(context.measures, float(moment["fps"]), frames)
