@@ -188,3 +188,27 @@ fn speeds_fall_with_density() {
         }
     }
 }
+
+#[test]
+#[ignore = "a measure of speed"]
+fn ten_thousand_people_take_a_step() {
+    // 100 m x 100 m with an exit of 10 m, one person on a square metre; frames are steps.
+    let walls = "[[[100, 55], [100, 100], [0, 100], [0, 0], [100, 0], [100, 45]]]";
+    for model in ALL {
+        let words = plan(walls, &gate("exit", "out", [100.0, 45.0], [100.0, 55.0]))
+            + &crowd("area = [[0.2, 0.2], [99.8, 99.8]]\ncount = 10000")
+            + &system(model).replace("crowd = {", "substeps = 1\ncrowd = {");
+        let mut sim = scene(&words);
+        run(&mut sim, 40);
+        let step = |sim: &mut Simulation| {
+            let start = std::time::Instant::now();
+            step(sim);
+            start.elapsed().as_secs_f64()
+        };
+        let mut times: Vec<f64> = (0..40).map(|_| step(&mut sim)).collect();
+        times.sort_by(f64::total_cmp);
+        println!("{model}: {:.2} ms a step, at best {:.2} ms", 1e3 * times[20], 1e3 * times[0]);
+        assert!(times[0] < 0.1, "{model}: {} s", times[0]);
+        assert_eq!(people(&sim) + sim.ledger().left.unwrap(), 10000);
+    }
+}

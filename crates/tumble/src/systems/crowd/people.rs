@@ -109,7 +109,8 @@ pub struct Move {
     pub phi: f64,
     /// The next gate at its start.
     pub gate: u32,
-    /// Whether it crosses a gate.
+    /// Whether a gate is near its end, and whether one is crossed.
+    pub near: bool,
     pub crosses: bool,
     /// Desired speed there [m/s].
     free: f64,
@@ -303,6 +304,7 @@ fn one(around: &Around<'_>, way: &Way, model: &Model, down: Point, h: f64, plane
     }
     let to = along(me.x, 1.0, u);
     let phi = me.out.map_or_else(|| way.distance(to), |out| me.phi - dot(u, out));
-    let crosses = plan.gates_near(to).iter().any(|g| crossing(plan.gates[*g as usize].line, me.x, to).is_some());
-    Move { u, heading, phi, gate: NONE, crosses, free: around.speed }
+    let gates = plan.gates_near(to);
+    let crosses = gates.iter().any(|g| crossing(plan.gates[*g as usize].line, me.x, to).is_some());
+    Move { u, heading, phi, gate: NONE, near: !gates.is_empty(), crosses, free: around.speed }
 }

@@ -196,7 +196,7 @@ impl Plan {
     }
 
     fn cell(&self, x: Point) -> usize {
-        let at = |a: usize| (x[a] - self.origin[a]).floor().clamp(0.0, (self.cells[a] - 1) as f64) as usize;
+        let at = |a: usize| (x[a] - self.origin[a]).clamp(0.0, (self.cells[a] - 1) as f64) as usize;
         at(0) + at(1) * self.cells[0]
     }
 

@@ -4,7 +4,7 @@
 //! It is charged to the next gate on the way, unless people beyond that gate stand, too: then the queue is that of theirs.
 
 use super::floor::{Floor, NEAR};
-use super::people::Person;
+use super::people::{Move, Person};
 use super::plan::{Point, crossing, length, sub};
 use super::way::{NONE, in_sight};
 
@@ -71,14 +71,14 @@ impl Tally {
     }
 
     /// For each gate the one whose queue people before it stand in: itself, or the next of most who are slow beyond it. h is the step [s].
-    pub fn queues(&mut self, floor: &Floor, people: &[Person], next: impl Iterator<Item = u32>, h: f64) -> Vec<u32> {
+    pub fn queues(&mut self, floor: &Floor, people: &[Person], moves: &[Move], h: f64) -> Vec<u32> {
         // Gate, next gate, and pace of those beyond it.
         let mut beyond = Vec::new();
-        for (p, next) in people.iter().zip(next).filter(|(p, next)| p.started && *next != NONE) {
-            for &g in floor.plan.gates_near(p.x).iter().filter(|g| **g != next) {
+        for (p, Move { gate: next, .. }) in people.iter().zip(moves).filter(|(p, to)| to.near && p.started && to.gate != NONE) {
+            for &g in floor.plan.gates_near(p.x).iter().filter(|g| *g != next) {
                 let gate = &floor.plan.gates[g as usize];
                 if p.phi < floor.gate(p.way, g as usize) && in_sight(&floor.plan, gate, p.x, NEAR).is_some() {
-                    beyond.push((g, next, (length(p.v) / p.free).min(1.0)));
+                    beyond.push((g, *next, (length(p.v) / p.free).min(1.0)));
                 }
             }
         }

@@ -56,7 +56,7 @@ impl Walk {
         self.before.extend(self.people.iter().map(|p| (p.x, p.phi)));
         step(&mut self.people, &self.floor, &self.model, &mut self.scratch, t, h);
         let moves = std::mem::take(&mut self.scratch.moves);
-        let queues = self.tally.queues(&self.floor, &self.people, moves.iter().map(|to| to.gate), h);
+        let queues = self.tally.queues(&self.floor, &self.people, &moves, h);
         let mut gone = Vec::new();
         for (i, to) in moves.iter().enumerate() {
             let p = &mut self.people[i];

@@ -193,7 +193,8 @@ impl Way {
     fn around(&self, x: Point) -> [(&Site, f64); 4] {
         let split = |a: usize| {
             let u = ((x[a] - self.origin[a]) / self.side - 0.5).clamp(0.0, (self.n[a] - 2) as f64);
-            (u.floor() as usize, u - u.floor())
+            let whole = u as usize;
+            (whole, u - whole as f64)
         };
         let ((i, s), (j, t)) = (split(0), split(1));
         let tiles = self.n[0].div_ceil(TILE);
