@@ -60,7 +60,8 @@ impl Orca {
             Ok(v) => v,
             Err((failed, v)) => safest(&planes, walls, failed, around.speed, v),
         };
-        let heading = if length(v) > 0.05 * around.speed { atan2(v[1], v[0]) } else { me.heading };
+        // Whoever is pushed back goes on facing where it wants to go.
+        let heading = if length(v) > 0.05 * around.speed && dot(v, wanted) > 0.0 { atan2(v[1], v[0]) } else { me.heading };
         Motion { v, heading }
     }
 

@@ -44,7 +44,8 @@ impl SocialForce {
         // Exact under accelerations that stay.                                                           (crowds.8)
         let end = along(along(around.makes_way(), around.speed * around.freedom(wanted), wanted), self.relaxation, a);
         let v = along(end, exp(-h / self.relaxation), sub(me.v, end));
-        let heading = if length(v) > 0.05 * around.speed { atan2(v[1], v[0]) } else { me.heading };
+        // Whoever is pushed back goes on facing where it wants to go.
+        let heading = if length(v) > 0.05 * around.speed && dot(v, wanted) > 0.0 { atan2(v[1], v[0]) } else { me.heading };
         Motion { v, heading }
     }
 
