@@ -24,7 +24,7 @@ pub const STEP: f64 = 0.02;
 pub const SOFT: f64 = 0.01;
 
 /// Acceleration by somebody who touches [m/s²], and over which distance it falls [m].
-const OTHERS: [f64; 2] = [3.0, 0.35];
+const OTHERS: [f64; 2] = [2.6, 0.35];
 /// How much of the relative velocity counts in the direction of who comes [s].
 const RELATIVE: f64 = 2.0;
 /// Widths of who slows down and of who turns aside, over angle and distance [1/m].
