@@ -68,6 +68,8 @@ class Ledger(TypedDict):
     """People on the floor."""
     left: int | None
     """People who have left by exits so far."""
+    stranded: int | None
+    """People on the floor from whom no way leads to where they go."""
     lost: float | None
     """Time that people have lost so far against walking freely, all together [s]."""
     divergence: float | None

@@ -7,39 +7,39 @@ use tumble_f64::scene::Simulation;
 use tumble_interface::{Assets, Engine, Scene};
 
 /// Frames a second: a step each.
-const FPS: f64 = 24.0;
+pub const FPS: f64 = 24.0;
 
-fn scene(words: &str) -> Simulation {
+pub fn scene(words: &str) -> Simulation {
     simulation(&text(words))
 }
 
-fn text(words: &str) -> String {
+pub fn text(words: &str) -> String {
     format!("dimension = 2\nplane = \"xy\"\ntime = {{ fps = {FPS}, frames = 100000 }}\n{words}")
 }
 
-fn plan(walls: &str, gates: &str) -> String {
+pub fn plan(walls: &str, gates: &str) -> String {
     format!("[[plan]]\nname = \"floor\"\nwalls = {walls}\n{gates}\n")
 }
 
-fn gate(kind: &str, name: &str, from: [f64; 2], to: [f64; 2]) -> String {
+pub fn gate(kind: &str, name: &str, from: [f64; 2], to: [f64; 2]) -> String {
     format!("[[plan.{kind}]]\nname = \"{name}\"\nfrom = {from:?}\nto = {to:?}\n")
 }
 
-fn crowd(words: &str) -> String {
+pub fn crowd(words: &str) -> String {
     format!("[[crowd]]\nname = \"people\"\n{words}\n")
 }
 
 /// A column of the plan: doors, then exits.
-fn gates(sim: &Simulation, name: &str) -> Vec<f64> {
+pub fn gates(sim: &Simulation, name: &str) -> Vec<f64> {
     sim.frame(&[]).column("floor", name).unwrap().data.numbers()
 }
 
-fn people(sim: &Simulation) -> u64 {
+pub fn people(sim: &Simulation) -> u64 {
     sim.ledger().people.unwrap()
 }
 
 /// Runs until all have left; how many they were over time, in person-seconds.
-fn empty(sim: &mut Simulation, seconds: f64, mut each: impl FnMut(&Simulation)) -> f64 {
+pub fn empty(sim: &mut Simulation, seconds: f64, mut each: impl FnMut(&Simulation)) -> f64 {
     let born = people(sim) + sim.ledger().left.unwrap();
     let mut time = 0.0;
     while people(sim) > 0 {
@@ -55,13 +55,13 @@ fn empty(sim: &mut Simulation, seconds: f64, mut each: impl FnMut(&Simulation)) 
 }
 
 /// Bodies overlap neither each other nor walls, but for round-off.
-fn apart(sim: &Simulation) {
+pub fn apart(sim: &Simulation) {
     let deepest = sim.ledger().penetration.unwrap();
     assert!(deepest < 1e-9, "{deepest} m at {} s", sim.time());
 }
 
 /// A room 16 m long and 8 m wide with a door of this width at its right end, and an exit 3 m behind.
-fn bottleneck(width: f64, people: &str) -> String {
+pub fn bottleneck(width: f64, people: &str) -> String {
     let (a, b) = (4.0 - 0.5 * width, 4.0 + 0.5 * width);
     let walls = format!("[[[8, {b}], [8, 8], [-8, 8], [-8, 0], [8, 0], [8, {a}]], [[8, 0], [11, 0]], [[8, 8], [11, 8]]]");
     plan(&walls, &(gate("door", "door", [8.0, a], [8.0, b]) + &gate("exit", "out", [11.0, 0.0], [11.0, 8.0]))) + &crowd(people)

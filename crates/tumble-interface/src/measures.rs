@@ -317,6 +317,8 @@ measures! {
         people: Option<u64> = Measure { columns: &["people"], ..STATE };
         /// People who have left by exits so far.
         left: Option<u64> = Measure { columns: &["left"], ..STATE };
+        /// People on the floor from whom no way leads to where they go.
+        stranded: Option<u64> = Measure { columns: &["stranded"], ..STATE };
         /// Time that people have lost so far against walking freely, all together.
         lost: Option<f64> = Measure { unit: "s", signed: true, columns: &["lost"], ..STATE };
         /// Largest divergence of a gas's velocity in a cell.

@@ -45,6 +45,8 @@ export interface Ledger {
   people: number | null;
   /** People who have left by exits so far. */
   left: number | null;
+  /** People on the floor from whom no way leads to where they go. */
+  stranded: number | null;
   /** Time that people have lost so far against walking freely, all together [s]. */
   lost: number | null;
   /** Largest divergence of a gas's velocity in a cell [1/s]. */

@@ -19,9 +19,15 @@ const MOST: f64 = 4096.0;
 impl Near {
     /// Sorts people into cells of this side [m].
     pub fn sort(&mut self, side: f64, places: impl Iterator<Item = Point> + Clone) {
-        let bound = |a: usize, f: fn(f64, f64) -> f64| places.clone().map(|p| p[a]).reduce(f).unwrap_or(0.0);
-        (self.side, self.low) = (side, [bound(0, f64::min), bound(1, f64::min)]);
-        let high = [bound(0, f64::max), bound(1, f64::max)];
+        let first = places.clone().next().unwrap_or([0.0; 2]);
+        let (mut low, mut high) = (first, first);
+        for p in places.clone() {
+            for a in 0..2 {
+                low[a] = if p[a] < low[a] { p[a] } else { low[a] };
+                high[a] = if p[a] > high[a] { p[a] } else { high[a] };
+            }
+        }
+        (self.side, self.low) = (side, low);
         self.n = [0, 1].map(|a| ((high[a] - self.low[a]) / side).min(MOST) as usize + 1);
         self.starts.clear();
         self.starts.resize(self.n[0] * self.n[1] + 1, 0);
@@ -45,7 +51,8 @@ impl Near {
 
     /// Ranges of `order` that hold everybody within `range` of a place.
     pub fn runs(&self, x: Point, range: f64) -> impl Iterator<Item = std::ops::Range<usize>> {
-        let [(x0, x1), (y0, y1)] = [0, 1].map(|a| (self.at(a, x[a] - range), self.at(a, x[a] + range)));
+        let (x0, x1) = (self.at(0, x[0] - range), self.at(0, x[0] + range));
+        let (y0, y1) = (self.at(1, x[1] - range), self.at(1, x[1] + range));
         (y0..=y1).map(move |y| self.starts[x0 + y * self.n[0]] as usize..self.starts[x1 + 1 + y * self.n[0]] as usize)
     }
 }

@@ -1,8 +1,8 @@
 //! Places for people at the start: on a triangular lattice as wide as it can be, each moved at random as far as it may be.
 
+use super::floor::Floor;
 use super::near::Near;
 use super::plan::{Point, along, inside, length, sub};
-use super::way::Floor;
 use crate::math::Random;
 use crate::math::functions::{cos, sin};
 
@@ -23,8 +23,8 @@ pub struct Room<'a> {
     pub count: usize,
     /// The largest radius of their bodies [m].
     pub radius: f64,
-    /// Which crowd they are.
-    pub crowd: u32,
+    /// The ways that they may take.
+    pub ways: &'a [u32],
 }
 
 /// By how much the lattice shrinks from try to try.
@@ -52,7 +52,7 @@ impl Room<'_> {
             };
             inside(self.polygon, x)
                 && floor.plan.clearance(x) >= self.radius
-                && floor.way(self.crowd).distance(x).is_finite()
+                && self.has_way(floor, x)
                 && near.runs(x, most + self.radius + extra).all(|run| near.order[run].iter().all(apart))
         };
         let mut spacing = (box_ / self.count as f64 / 0.866).sqrt().max(least);
@@ -83,12 +83,17 @@ impl Room<'_> {
         order.into_iter().map(moved).collect()
     }
 
+    /// Whether there is a way from a place.
+    fn has_way(&self, floor: &Floor, x: Point) -> bool {
+        self.ways.iter().any(|way| floor.way(*way).distance(x).is_finite())
+    }
+
     /// Whether bodies fit somewhere in the area, but nowhere with a way.
     fn is_cut_off(&self, floor: &Floor, low: Point, high: Point) -> bool {
         let step = (0.5 * self.radius).max(((high[0] - low[0]) * (high[1] - low[1])).sqrt() / 300.0);
         let mut fit = lattice(low, high, step).filter(|x| inside(self.polygon, *x) && floor.plan.clearance(*x) >= self.radius);
         let first = fit.next();
-        first.is_some() && first.into_iter().chain(fit).all(|x| floor.way(self.crowd).distance(x).is_infinite())
+        first.is_some() && first.into_iter().chain(fit).all(|x| !self.has_way(floor, x))
     }
 }
 

@@ -65,6 +65,8 @@ pub struct Gate {
     pub line: Line,
     /// Whether people leave there.
     pub exit: bool,
+    /// When it opens and when it closes [s], if it does.
+    pub hours: [Option<f64>; 2],
 }
 
 impl Gate {
@@ -72,15 +74,48 @@ impl Gate {
     pub fn width(&self) -> f64 {
         length(sub(self.line[1], self.line[0]))
     }
+
+    /// Whether it is closed at t [s]: before it opens, and from when it closes. One that closes before it opens is open at the start.
+    pub fn is_closed(&self, t: f64) -> bool {
+        match self.hours {
+            [None, None] => false,
+            [Some(opens), None] => t < opens,
+            [None, Some(closes)] => t >= closes,
+            [Some(opens), Some(closes)] if opens < closes => t < opens || t >= closes,
+            [Some(opens), Some(closes)] => t >= closes && t < opens,
+        }
+    }
+}
+
+/// Stairs or a ramp.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope {
+    /// Which way it rises, a unit vector.
+    pub up: Point,
+    /// Speed upward over that on the level, in plan.
+    pub up_factor: f64,
+    /// The same downward.
+    pub down_factor: f64,
+}
+
+impl Slope {
+    /// Speed in a direction over that on the level.
+    pub fn factor(&self, e: Point) -> f64 {
+        if dot(e, self.up) > 0.0 { self.up_factor } else { self.down_factor }
+    }
 }
 
 /// Walls and gates.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
-    /// Walls.
+    /// Walls, then closed gates.
     pub walls: Vec<Line>,
+    /// How many are walls.
+    pub solid: usize,
     /// Doors and exits.
     pub gates: Vec<Gate>,
+    /// Corners of slopes, and the slopes.
+    pub slopes: Vec<(Vec<Point>, Slope)>,
     /// The lowest corner of all.
     pub low: Point,
     /// The highest.
@@ -92,6 +127,8 @@ pub struct Plan {
     near_walls: Lists,
     /// Gates within 1 m.
     near_gates: Lists,
+    /// How far lists of walls reach [m].
+    reach: f64,
 }
 
 /// A list for each cell.
@@ -132,11 +169,34 @@ impl Plan {
         };
         let near_walls = lists(&walls, reach);
         let near_gates = lists(&gates.iter().map(|g| g.line).collect::<Vec<_>>(), 1.0);
-        Self { walls, gates, low, high, cells, origin, near_walls, near_gates }
+        Self { solid: walls.len(), walls, gates, slopes: Vec::new(), low, high, cells, origin, near_walls, near_gates, reach }
+    }
+
+    /// The same with slopes, each the corners of a polygon, and what it is.
+    pub fn with_slopes(self, slopes: Vec<(Vec<Point>, Slope)>) -> Self {
+        Self { slopes, ..self }
+    }
+
+    /// The same with gates that are always open.
+    pub fn without_hours(mut self) -> Self {
+        self.gates.iter_mut().for_each(|gate| gate.hours = [None; 2]);
+        self
+    }
+
+    /// The same with walls across closed gates.
+    pub fn with_closed(&self, closed: &[bool]) -> Self {
+        let lines = self.gates.iter().zip(closed).filter(|(_, closed)| **closed).map(|(gate, _)| gate.line);
+        let walls = self.walls[..self.solid].iter().copied().chain(lines).collect();
+        Self { solid: self.solid, ..Self::new(walls, self.gates.clone(), self.reach).with_slopes(self.slopes.clone()) }
+    }
+
+    /// The slope at a place.
+    pub fn slope(&self, x: Point) -> Option<&Slope> {
+        self.slopes.iter().find(|(polygon, _)| inside(polygon, x)).map(|(_, slope)| slope)
     }
 
     fn cell(&self, x: Point) -> usize {
-        let at = |a: usize| (x[a] - self.origin[a]).floor().clamp(0.0, (self.cells[a] - 1) as f64) as usize;
+        let at = |a: usize| (x[a] - self.origin[a]).clamp(0.0, (self.cells[a] - 1) as f64) as usize;
         at(0) + at(1) * self.cells[0]
     }
 
@@ -155,9 +215,18 @@ impl Plan {
         near.iter().all(|w| !meets(self.walls[*w as usize], x, y))
     }
 
-    /// Distance to the nearest wall of those near [m].
+    /// The same, if all gates were open.
+    pub fn sees_past_gates(&self, near: &[u32], x: Point, y: Point) -> bool {
+        near.iter().all(|w| *w as usize >= self.solid || !meets(self.walls[*w as usize], x, y))
+    }
+
+    /// Distance to the nearest wall of those near [m]. Closed gates are none.
     pub fn clearance(&self, x: Point) -> f64 {
-        self.near(x).iter().map(|w| length(sub(x, nearest(self.walls[*w as usize], x)))).fold(f64::INFINITY, f64::min)
+        self.near(x)
+            .iter()
+            .filter(|w| (**w as usize) < self.solid)
+            .map(|w| length(sub(x, nearest(self.walls[*w as usize], x))))
+            .fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -3,9 +3,10 @@
 //! Somebody who gets d nearer to the exit in a step h loses h - d/v0: summed over a way, its time less that of walking it freely. (crowds.7)
 //! It is charged to the next gate on the way, unless people beyond that gate stand, too: then the queue is that of theirs.
 
-use super::people::Person;
+use super::floor::{Floor, NEAR};
+use super::people::{Move, Person};
 use super::plan::{Point, crossing, length, sub};
-use super::way::{Floor, NEAR, NONE, in_sight};
+use super::way::{NONE, in_sight};
 
 /// Mean speed of people beyond a gate over their desired ones, below which its queue is that of the next gate.
 const SLOW: f64 = 0.45;
@@ -49,37 +50,35 @@ impl Tally {
         }
     }
 
-    /// Counts the gates that a step of h [s] from t crosses, and says which way out ends it, a unit vector, and at which part of the step.
-    pub fn cross(&mut self, floor: &Floor, exits: &[usize], before: Point, after: Point, t: f64, h: f64) -> Option<(Point, f64)> {
+    /// Counts the gates that a step of h [s] from t crosses; at which part of the step each was, which it is, and the way across, a unit vector.
+    pub fn cross(&mut self, floor: &Floor, before: Point, after: Point, t: f64, h: f64) -> Vec<(f64, usize, Point)> {
         let mut met: Vec<(f64, usize, bool)> = Vec::new();
         for &g in floor.plan.gates_near(after) {
             let found = crossing(floor.plan.gates[g as usize].line, before, after);
             met.extend(found.map(|(s, to_right)| (s, g as usize, to_right)));
         }
         met.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (s, g, to_right) in met {
+        let mut count = |(s, g, to_right): (f64, usize, bool)| {
             self.crossed[g][usize::from(!to_right)] += 1;
             let at = t + s * h;
             self.span[g] = [if self.span[g][0].is_nan() { at } else { self.span[g][0] }, at];
-            if exits.contains(&g) {
-                let [a, b] = floor.plan.gates[g].line;
-                let d = sub(b, a);
-                let side = if to_right { 1.0 } else { -1.0 } / length(d);
-                return Some(([side * d[1], -side * d[0]], s));
-            }
-        }
-        None
+            let [a, b] = floor.plan.gates[g].line;
+            let d = sub(b, a);
+            let side = if to_right { 1.0 } else { -1.0 } / length(d);
+            (s, g, [side * d[1], -side * d[0]])
+        };
+        met.into_iter().map(&mut count).collect()
     }
 
     /// For each gate the one whose queue people before it stand in: itself, or the next of most who are slow beyond it. h is the step [s].
-    pub fn queues(&mut self, floor: &Floor, people: &[Person], next: impl Iterator<Item = u32>, h: f64) -> Vec<u32> {
+    pub fn queues(&mut self, floor: &Floor, people: &[Person], moves: &[Move], h: f64) -> Vec<u32> {
         // Gate, next gate, and pace of those beyond it.
         let mut beyond = Vec::new();
-        for (p, next) in people.iter().zip(next).filter(|(p, next)| p.started && *next != NONE) {
-            for &g in floor.plan.gates_near(p.x).iter().filter(|g| **g != next) {
+        for (p, Move { gate: next, .. }) in people.iter().zip(moves).filter(|(p, to)| to.near && p.started && to.gate != NONE) {
+            for &g in floor.plan.gates_near(p.x).iter().filter(|g| *g != next) {
                 let gate = &floor.plan.gates[g as usize];
-                if p.phi < floor.gate(p.crowd, g as usize) && in_sight(&floor.plan, gate, p.x, NEAR).is_some() {
-                    beyond.push((g, next, (length(p.v) / p.speed).min(1.0)));
+                if p.phi < floor.gate(p.way, g as usize) && in_sight(&floor.plan, gate, p.x, NEAR).is_some() {
+                    beyond.push((g, *next, (length(p.v) / p.free).min(1.0)));
                 }
             }
         }

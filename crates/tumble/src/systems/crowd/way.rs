@@ -2,9 +2,18 @@
 //!
 //!   |grad phi| = 1, phi = 0 at exits                                                                              (crowds.1)
 //!
-//! by fast sweeping, which visits cells in a fixed order. Source: [zhao2005].
+//! by fast sweeping, which visits cells in a fixed order. Source: [zhao2005]. On slopes a metre counts as much more as people are slower there.
 
-use super::plan::{Gate, Line, MARGIN, Plan, Point, along, length, meets, nearest, sub};
+use super::plan::{Gate, Line, MARGIN, Plan, Point, Slope, along, dot, length, meets, nearest, sub};
+
+/// What a way leads to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Target {
+    /// A gate.
+    Gate(usize),
+    /// The floor within a radius [m] of a place.
+    Place(Point, f64),
+}
 
 /// A link between cells that a wall crosses.
 const WALL: u32 = u32::MAX;
@@ -27,6 +36,8 @@ pub struct Cells {
     open: Vec<bool>,
     /// What the link to the next cell along x and along y crosses: a gate, a wall, or `NONE`.
     links: [Vec<u32>; 2],
+    /// The slope that each lies on; empty without slopes.
+    slopes: Vec<Option<Slope>>,
 }
 
 impl Cells {
@@ -35,7 +46,10 @@ impl Cells {
         let origin = [plan.low[0] - MARGIN, plan.low[1] - MARGIN];
         let n = [0, 1].map(|a| ((plan.high[a] - plan.low[a] + 2.0 * MARGIN) / side).ceil() as usize + 1);
         let all = n[0] * n[1];
-        let mut cells = Self { origin, side, n, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]] };
+        let mut cells = Self { origin, side, n, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new() };
+        if !plan.slopes.is_empty() {
+            cells.slopes = (0..all).map(|i| plan.slope(cells.middle(i)).copied()).collect();
+        }
         for (g, gate) in plan.gates.iter().enumerate() {
             cells.cut(gate.line, g as u32);
         }
@@ -123,7 +137,18 @@ pub fn in_sight(plan: &Plan, gate: &Gate, x: Point, far: f64) -> Option<usize> {
     let middle = [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
     let foot = along(foot, 1e-3, sub(middle, foot));
     let left = super::plan::cross(sub(gate.line[1], gate.line[0]), sub(x, gate.line[0])) >= 0.0;
-    plan.sees(plan.near(x), x, foot).then_some(usize::from(!left))
+    plan.sees_past_gates(plan.near(x), x, foot).then_some(usize::from(!left))
+}
+
+/// What a way is at the middle of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Site {
+    /// Distance to the target [m]; infinite where there is no way.
+    phi: f64,
+    /// Unit vector down the gradient.
+    down: [f32; 2],
+    /// The first gate on the way; `NONE` where there is none.
+    next: u32,
 }
 
 /// Distance, direction and next gate at every place.
@@ -131,49 +156,109 @@ pub struct Way {
     origin: Point,
     side: f64,
     n: [usize; 2],
-    /// Distance to the exit [m]; infinite where there is no way.
-    phi: Vec<f64>,
-    /// Unit vector down the gradient.
-    down: Vec<[f32; 2]>,
-    /// The first gate on the way; `NONE` where there is none.
-    next: Vec<u32>,
+    /// In square tiles, so that neighbours along both axes are near in memory.
+    sites: Vec<Site>,
+}
+
+/// Side of a tile, in cells.
+const TILE: usize = 8;
+
+/// Where a cell is among tiles, of which so many are along x.
+fn in_tiles(x: usize, y: usize, tiles: usize) -> usize {
+    (x / TILE + y / TILE * tiles) * TILE * TILE + x % TILE + y % TILE * TILE
 }
 
 impl Way {
-    /// The way to the nearest of these exits, for bodies of this radius [m].
-    pub fn new(plan: &Plan, cells: &mut Cells, exits: &[usize], radius: f64) -> Self {
+    /// The way to the nearest of these targets, for bodies of this radius [m].
+    pub fn new(plan: &Plan, cells: &mut Cells, targets: &[Target], radius: f64) -> Self {
         let all = cells.open.len();
-        let mut way = Self {
-            origin: cells.origin,
-            side: cells.side,
-            n: cells.n,
-            phi: vec![f64::INFINITY; all],
-            down: vec![[0.0; 2]; all],
-            next: vec![NONE; all],
-        };
-        let mut exact = vec![false; all];
-        for &g in exits {
-            let [a, b] = plan.gates[g].line;
-            let inner = (radius / length(sub(b, a))).min(0.5);
-            let line = [along(a, inner, sub(b, a)), along(b, inner, sub(a, b))];
-            let far = EXACT * cells.side;
-            cells.around(line, far, |cells, i, x| {
-                let foot = nearest(line, x);
-                let d = length(sub(x, foot));
-                if cells.open[i] && d <= far && d < way.phi[i] && plan.sees(plan.near(x), x, foot) {
-                    (way.phi[i], way.next[i], exact[i]) = (d, g as u32, true);
-                }
-            });
+        let mut way =
+            Solution { side: cells.side, n: cells.n, phi: vec![f64::INFINITY; all], next: vec![NONE; all], exact: vec![false; all] };
+        for target in targets {
+            way.begin(plan, cells, *target, radius);
         }
-        way.sweep(cells, &exact);
+        way.sweep(cells);
         way.widen(cells, radius);
-        way.descend(cells);
-        way.name_gates(cells, &exact);
-        way
+        way.name_gates(cells);
+        let tiles = cells.n.map(|n| n.div_ceil(TILE));
+        let mut sites = vec![Site { phi: f64::INFINITY, down: [0.0; 2], next: NONE }; tiles[0] * tiles[1] * TILE * TILE];
+        for i in 0..all {
+            let site = Site { phi: way.phi[i], down: way.down(cells, i), next: way.next[i] };
+            sites[in_tiles(i % cells.n[0], i / cells.n[0], tiles[0])] = site;
+        }
+        Self { origin: cells.origin, side: cells.side, n: cells.n, sites }
+    }
+
+    /// The four cells around a place, with their weights.
+    fn around(&self, x: Point) -> [(&Site, f64); 4] {
+        let split = |a: usize| {
+            let u = ((x[a] - self.origin[a]) / self.side - 0.5).clamp(0.0, (self.n[a] - 2) as f64);
+            let whole = u as usize;
+            (whole, u - whole as f64)
+        };
+        let ((i, s), (j, t)) = (split(0), split(1));
+        let tiles = self.n[0].div_ceil(TILE);
+        let at = |p: usize, q: usize| &self.sites[in_tiles(i + p, j + q, tiles)];
+        [(at(0, 0), (1.0 - s) * (1.0 - t)), (at(1, 0), s * (1.0 - t)), (at(0, 1), (1.0 - s) * t), (at(1, 1), s * t)]
+    }
+
+    /// Distance to the target [m]; infinite where there is no way.
+    pub fn distance(&self, x: Point) -> f64 {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (site, w) in self.around(x) {
+            if site.phi < f64::INFINITY && w > 0.0 {
+                (sum, weight) = (sum + w * site.phi, weight + w);
+            }
+        }
+        if weight > 0.0 { sum / weight } else { f64::INFINITY }
+    }
+
+    /// Where to go, a unit vector; zero where there is no way. And the next gate on the way.
+    pub fn direction(&self, x: Point) -> (Point, u32) {
+        let around = self.around(x);
+        let mut e = [0.0; 2];
+        for (site, w) in around {
+            e = along(e, w, site.down.map(f64::from));
+        }
+        let size = length(e);
+        let nearest = around.into_iter().filter(|(site, _)| site.phi < f64::INFINITY).reduce(|a, b| if b.1 > a.1 { b } else { a });
+        (if size > 1e-9 { e.map(|e| e / size) } else { [0.0; 2] }, nearest.map_or(NONE, |(site, _)| site.next))
+    }
+}
+
+/// A way while it is solved for.
+struct Solution {
+    side: f64,
+    n: [usize; 2],
+    phi: Vec<f64>,
+    next: Vec<u32>,
+    /// Where distances are not to be solved for.
+    exact: Vec<bool>,
+}
+
+impl Solution {
+    /// Distances around a target.
+    fn begin(&mut self, plan: &Plan, cells: &mut Cells, target: Target, radius: f64) {
+        let far = EXACT * cells.side;
+        let (line, beyond, next) = match target {
+            Target::Gate(g) => {
+                let [a, b] = plan.gates[g].line;
+                let inner = (radius / length(sub(b, a))).min(0.5);
+                ([along(a, inner, sub(b, a)), along(b, inner, sub(a, b))], 0.0, g as u32)
+            }
+            Target::Place(at, radius) => ([at, at], radius, NONE),
+        };
+        cells.around(line, beyond + far, |cells, i, x| {
+            let foot = nearest(line, x);
+            let d = (length(sub(x, foot)) - beyond).max(0.0);
+            if cells.open[i] && d <= far && d < self.phi[i] && plan.sees(plan.near(x), x, foot) {
+                (self.phi[i], self.next[i], self.exact[i]) = (d, next, true);
+            }
+        });
     }
 
     /// Solves (crowds.1) in open cells.
-    fn sweep(&mut self, cells: &Cells, exact: &[bool]) {
+    fn sweep(&mut self, cells: &Cells) {
         let [nx, ny] = self.n;
         for _ in 0..ROUNDS {
             let mut changed = false;
@@ -182,16 +267,10 @@ impl Way {
                     let y = if order & 2 == 0 { y } else { ny - 1 - y };
                     for x in 0..nx {
                         let i = if order & 1 == 0 { x } else { nx - 1 - x } + y * nx;
-                        if exact[i] || !cells.open[i] {
+                        if self.exact[i] || !cells.open[i] {
                             continue;
                         }
-                        let at = |a, ahead| cells.neighbour(i, a, ahead).map_or(f64::INFINITY, |(j, _)| self.phi[j]);
-                        let [a, b] = [0, 1].map(|a| at(a, false).min(at(a, true)));
-                        if a.min(b) == f64::INFINITY {
-                            continue;
-                        }
-                        let h = self.side;
-                        let phi = if (a - b).abs() >= h { a.min(b) + h } else { 0.5 * (a + b + (2.0 * h * h - (a - b) * (a - b)).sqrt()) };
+                        let phi = self.solve(cells, i);
                         if phi < self.phi[i] {
                             self.phi[i] = phi;
                             changed = true;
@@ -205,6 +284,31 @@ impl Way {
         }
     }
 
+    /// The distance of a cell from those of its neighbours.
+    fn solve(&self, cells: &Cells, i: usize) -> f64 {
+        let at = |a, ahead| cells.neighbour(i, a, ahead).map_or(f64::INFINITY, |(j, _)| self.phi[j]);
+        let sides = [0, 1].map(|a| [at(a, false), at(a, true)]);
+        let [a, b] = sides.map(|[behind, ahead]| behind.min(ahead));
+        if a.min(b) == f64::INFINITY {
+            return f64::INFINITY;
+        }
+        let within = |h: f64| if (a - b).abs() >= h { a.min(b) + h } else { 0.5 * (a + b + (2.0 * h * h - (a - b) * (a - b)).sqrt()) };
+        let Some(slope) = cells.slopes.get(i).copied().flatten() else {
+            return within(self.side);
+        };
+        // Upward or downward, whichever of the two leads that way; the slower one where both or neither does.
+        let [up, down] = [slope.up_factor, slope.down_factor].map(|factor| within(self.side / factor));
+        let rises = |phi: f64| {
+            let along = |axis: usize, least: f64| if sides[axis][1] < sides[axis][0] { 1.0 } else { -1.0 } * (phi - least).max(0.0);
+            dot([along(0, a), along(1, b)], slope.up) > 0.0
+        };
+        match (rises(up), rises(down)) {
+            (true, true) => up,
+            (false, false) => down,
+            _ => up.max(down),
+        }
+    }
+
     /// Continues the distance to where bodies do not fit, so that whoever is smaller finds back.
     fn widen(&mut self, cells: &Cells, radius: f64) {
         for _ in 0..(radius / self.side).ceil() as usize + 1 {
@@ -215,29 +319,28 @@ impl Way {
         }
     }
 
-    /// Directions down the gradient, by central differences, at walls by one-sided ones.
-    fn descend(&mut self, cells: &Cells) {
-        for i in (0..self.phi.len()).filter(|i| self.phi[*i] < f64::INFINITY) {
-            let slope = |a: usize| {
-                let at = |ahead| cells.neighbour(i, a, ahead).map(|(j, _)| self.phi[j]).filter(|phi| phi.is_finite());
-                match (at(false), at(true)) {
-                    (Some(low), Some(high)) => 0.5 * (high - low),
-                    (None, Some(high)) => high - self.phi[i],
-                    (Some(low), None) => self.phi[i] - low,
-                    (None, None) => 0.0,
-                }
-            };
-            let g = [slope(0), slope(1)];
-            let size = length(g);
-            if size > 0.0 {
-                self.down[i] = [(-g[0] / size) as f32, (-g[1] / size) as f32];
-            }
+    /// The direction down the gradient, by central differences, at walls by one-sided ones.
+    fn down(&self, cells: &Cells, i: usize) -> [f32; 2] {
+        if self.phi[i] == f64::INFINITY {
+            return [0.0; 2];
         }
+        let slope = |a: usize| {
+            let at = |ahead| cells.neighbour(i, a, ahead).map(|(j, _)| self.phi[j]).filter(|phi| phi.is_finite());
+            match (at(false), at(true)) {
+                (Some(low), Some(high)) => 0.5 * (high - low),
+                (None, Some(high)) => high - self.phi[i],
+                (Some(low), None) => self.phi[i] - low,
+                (None, None) => 0.0,
+            }
+        };
+        let g = [slope(0), slope(1)];
+        let size = length(g);
+        if size > 0.0 { [(-g[0] / size) as f32, (-g[1] / size) as f32] } else { [0.0; 2] }
     }
 
     /// Names the first gate on the way from each cell, from the exits outward.
-    fn name_gates(&mut self, cells: &Cells, exact: &[bool]) {
-        let mut order: Vec<usize> = (0..self.phi.len()).filter(|i| self.phi[*i] < f64::INFINITY && !exact[*i]).collect();
+    fn name_gates(&mut self, cells: &Cells) {
+        let mut order: Vec<usize> = (0..self.phi.len()).filter(|i| self.phi[*i] < f64::INFINITY && !self.exact[*i]).collect();
         order.sort_by(|a, b| self.phi[*a].total_cmp(&self.phi[*b]).then(a.cmp(b)));
         for i in order {
             let lowest = cells.neighbours(i).min_by(|(a, _), (b, _)| self.phi[*a].total_cmp(&self.phi[*b]));
@@ -245,89 +348,5 @@ impl Way {
                 self.next[i] = if link == NONE { self.next[j] } else { link };
             }
         }
-    }
-
-    /// The four cells around a place, with their weights.
-    fn around(&self, x: Point) -> [(usize, f64); 4] {
-        let split = |a: usize| {
-            let u = ((x[a] - self.origin[a]) / self.side - 0.5).clamp(0.0, (self.n[a] - 2) as f64);
-            (u.floor() as usize, u - u.floor())
-        };
-        let ((i, s), (j, t)) = (split(0), split(1));
-        let at = |p: usize, q: usize| i + p + (j + q) * self.n[0];
-        [(at(0, 0), (1.0 - s) * (1.0 - t)), (at(1, 0), s * (1.0 - t)), (at(0, 1), (1.0 - s) * t), (at(1, 1), s * t)]
-    }
-
-    /// Distance to the exit [m]; infinite where there is no way.
-    pub fn distance(&self, x: Point) -> f64 {
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (i, w) in self.around(x) {
-            if self.phi[i] < f64::INFINITY && w > 0.0 {
-                (sum, weight) = (sum + w * self.phi[i], weight + w);
-            }
-        }
-        if weight > 0.0 { sum / weight } else { f64::INFINITY }
-    }
-
-    /// Where to go, a unit vector; zero where there is no way.
-    pub fn direction(&self, x: Point) -> Point {
-        let mut e = [0.0; 2];
-        for (i, w) in self.around(x) {
-            e = along(e, w, self.down[i].map(f64::from));
-        }
-        let size = length(e);
-        if size > 1e-9 { e.map(|e| e / size) } else { [0.0; 2] }
-    }
-
-    /// The next gate on the way from x.
-    pub fn gate(&self, x: Point) -> u32 {
-        let nearest = self.around(x).into_iter().filter(|(i, _)| self.phi[*i] < f64::INFINITY).reduce(|a, b| if b.1 > a.1 { b } else { a });
-        nearest.map_or(NONE, |(i, _)| self.next[i])
-    }
-}
-
-/// A plan with the ways of all crowds.
-pub struct Floor {
-    /// Walls and gates.
-    pub plan: Plan,
-    /// Floor [m²] on both sides of each gate.
-    pub areas: Vec<[f64; 2]>,
-    ways: Vec<Way>,
-    /// Which of the ways each crowd takes.
-    of: Vec<usize>,
-    /// Distance of the middle of each gate to the exit, for each way [m].
-    gates: Vec<Vec<f64>>,
-}
-
-/// How far from a gate people are near it [m].
-pub const NEAR: f64 = 1.0;
-
-impl Floor {
-    /// The floor for crowds that leave by these exits, each a sorted list of gates, with bodies of up to this radius [m].
-    pub fn new(plan: Plan, exits: &[Vec<usize>], side: f64, radius: f64) -> Self {
-        let mut cells = Cells::new(&plan, side, radius);
-        let areas = plan.gates.iter().map(|gate| cells.floor(&plan, gate, NEAR)).collect();
-        let (mut ways, mut known, mut of) = (Vec::new(), Vec::<&Vec<usize>>::new(), Vec::new());
-        for exits in exits {
-            let k = known.iter().position(|k| *k == exits).unwrap_or_else(|| {
-                known.push(exits);
-                ways.push(Way::new(&plan, &mut cells, exits, radius));
-                ways.len() - 1
-            });
-            of.push(k);
-        }
-        let middle = |gate: &Gate| [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
-        let gates = ways.iter().map(|way| plan.gates.iter().map(|gate| way.distance(middle(gate))).collect()).collect();
-        Self { plan, areas, ways, of, gates }
-    }
-
-    /// The way of a crowd.
-    pub fn way(&self, crowd: u32) -> &Way {
-        &self.ways[self.of[crowd as usize]]
-    }
-
-    /// Distance of a gate to the exit of a crowd [m].
-    pub fn gate(&self, crowd: u32, gate: usize) -> f64 {
-        self.gates[self.of[crowd as usize]][gate]
     }
 }

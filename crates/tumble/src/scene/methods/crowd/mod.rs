@@ -1,17 +1,23 @@
 //! Crowds: words to a floor and the people on it.
 
+mod population;
+
 use super::{MethodRules, is_in, scheme_of_its_own};
-use crate::math::Random;
-use crate::math::functions::{atan2, cos, ln};
+use crate::math::functions::exp;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
 use crate::system::System;
 use crate::systems::crowd::{
-    Crowd as People, Floor, Gate, Line, Misfit, Model, Person, Plan as Walls, Point, Room, Settings, nearest, overlapping, reach,
+    AnticipationVelocity, CollisionFreeSpeed, Crowd as People, Floor, Gate, Goal, Line, Model, Orca, Plan as Walls, Point, Settings, Slope,
+    SocialForce, journeys, nearest,
 };
+use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{Crowd, Gate as Words, Integrator, Method, Plan as Floors, Plane, Scene, System as Plan};
+use tumble_interface::scene::{
+    Choice, Crowd, Gate as Words, Integrator, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners,
+    floor,
+};
 use tumble_interface::{Issue, Warning};
 
 /// Bytes for a person: its row three times, and what a step needs.
@@ -24,11 +30,6 @@ const SIDE: [f64; 2] = [0.1, 0.6];
 const LONG: usize = 4000;
 /// A plan as wide as this [m] is in millimetres.
 const WIDE: f64 = 5000.0;
-
-// Purposes of random numbers.
-const RADIUS: u32 = 16;
-const SPEED: u32 = 17;
-const REACTION: u32 = 18;
 
 pub struct Rules;
 
@@ -45,15 +46,38 @@ fn lines(walls: &[Vec<Point>]) -> Vec<Line> {
 fn gates(plan: &Floors) -> Vec<(String, Gate)> {
     let of = |key: &str, k: usize, words: &Words, exit: bool| {
         let line = [words.from, words.to].map(|p| p.map(|x| x * plan.scale));
-        (format!("plan \"{}\".{key}[{k}]", plan.name), Gate { name: words.name.clone(), line, exit })
+        (format!("plan \"{}\".{key}[{k}]", plan.name), Gate { name: words.name.clone(), line, exit, hours: [words.opens, words.closes] })
     };
     let doors = plan.door.iter().enumerate().map(|(k, door)| of("door", k, door, false));
     doors.chain(plan.exit.iter().enumerate().map(|(k, exit)| of("exit", k, exit, true))).collect()
 }
 
-/// The largest radius of a crowd [m].
-fn largest(thing: &Crowd) -> f64 {
-    thing.radius * (1.0 + thing.radius_spread)
+/// Areas of stairs and ramps, each with its place in the scene.
+fn areas(plan: &Floors) -> Vec<(String, Vec<Point>, Point)> {
+    let place = |key: &str, k: usize| format!("plan \"{}\".{key}[{k}]", plan.name);
+    let scaled = |area: &[Point]| corners(area).into_iter().map(|p| p.map(|x| x * plan.scale)).collect();
+    let stairs = plan.stairs.iter().enumerate().map(|(k, s)| (place("stairs", k), scaled(&s.area), s.up));
+    stairs.chain(plan.ramp.iter().enumerate().map(|(k, r)| (place("ramp", k), scaled(&r.area), r.up))).collect()
+}
+
+/// Stairs and ramps.
+fn slopes(plan: &Floors) -> Vec<(Vec<Point>, Slope)> {
+    // [tobler1993]: the speed at a slope s is as exp(-3.5 |s + 0.05|).
+    let tobler = |s: f64| exp(-3.5 * (s + 0.05).abs()) / exp(-3.5 * 0.05);
+    let stairs = plan.stairs.iter().map(|s| [s.up_factor, s.down_factor]);
+    let factors = stairs.chain(plan.ramp.iter().map(|r| [tobler(r.slope), tobler(-r.slope)]));
+    let slope = |((_, polygon, up), [up_factor, down_factor]): ((String, Vec<Point>, Point), [f64; 2])| {
+        let size = (up[0] * up[0] + up[1] * up[1]).sqrt();
+        (polygon, Slope { up: up.map(|u| u / size), up_factor, down_factor })
+    };
+    areas(plan).into_iter().zip(factors).map(slope).collect()
+}
+
+/// A door or a waypoint by its name.
+fn goal(plan: &Floors, name: &str) -> Option<Goal> {
+    let door = plan.door.iter().position(|door| door.name == name).map(Goal::Gate);
+    let place = || plan.waypoint.iter().find(|w| w.name == name).map(|w| Goal::Place(w.at.map(|x| x * plan.scale), w.radius));
+    door.or_else(place)
 }
 
 /// The plan and the crowds of a system.
@@ -61,9 +85,38 @@ fn own<'a>(scene: &'a Scene, plan: &Plan) -> (Vec<&'a Floors>, Vec<&'a Crowd>) {
     (scene.plan.iter().filter(|t| is_in(&t.system, plan)).collect(), scene.crowd.iter().filter(|t| is_in(&t.system, plan)).collect())
 }
 
-fn model(plan: &Plan) -> Model {
-    let words = plan.crowd.clone().unwrap_or_default();
-    Model { time_gap: words.time_gap, buffer: words.buffer }
+fn model(words: &Walking) -> Model {
+    let buffer = words.buffer.unwrap_or(0.04);
+    match words.model {
+        Steering::CollisionFreeSpeed => Model::CollisionFreeSpeed(CollisionFreeSpeed { time_gap: words.time_gap.unwrap_or(0.65), buffer }),
+        Steering::SocialForce => {
+            Model::SocialForce(SocialForce { mass: words.mass.unwrap_or(80.0), relaxation: words.relaxation.unwrap_or(0.5) })
+        }
+        Steering::AnticipationVelocity => {
+            Model::AnticipationVelocity(AnticipationVelocity { time_gap: words.time_gap.unwrap_or(0.5), buffer })
+        }
+        Steering::Orca => Model::Orca(Orca { time_horizon: words.time_horizon.unwrap_or(2.0) }),
+    }
+}
+
+/// Words of another model.
+fn check_model(plan: &Plan, issues: &mut Vec<Issue>) {
+    let Some(words) = &plan.crowd else { return };
+    let gaps = matches!(words.model, Steering::CollisionFreeSpeed | Steering::AnticipationVelocity);
+    let (forces, clear) = (words.model == Steering::SocialForce, words.model == Steering::Orca);
+    let of = [
+        ("time_gap", words.time_gap.is_some() && !gaps, "collision_free_speed and anticipation_velocity"),
+        ("buffer", words.buffer.is_some() && !gaps, "collision_free_speed and anticipation_velocity"),
+        ("mass", words.mass.is_some() && !forces, "social_force"),
+        ("relaxation", words.relaxation.is_some() && !forces, "social_force"),
+        ("time_horizon", words.time_horizon.is_some() && !clear, "orca"),
+    ];
+    for (word, _, models) in of.into_iter().filter(|(_, idle, _)| *idle) {
+        issues.push(Issue::new(
+            format!("system \"{}\".crowd.{word}", plan.name),
+            format!("of the model {models}; leave it out, or set model"),
+        ));
+    }
 }
 
 fn at(x: Point) -> String {
@@ -148,9 +201,12 @@ fn check_gates(thing: &Floors, radius: f64, issues: &mut Vec<Issue>) {
 /// What is wrong with the words of a crowd.
 fn check_crowd(thing: &Crowd, plan: Option<&Floors>, issues: &mut Vec<Issue>) {
     let path = format!("crowd \"{}\"", thing.name);
-    let given = [thing.count.is_some(), thing.density.is_some(), !thing.position.is_empty()];
+    let given = [thing.count.is_some(), thing.density.is_some(), !thing.position.is_empty(), !thing.arrivals.is_empty()];
     if given.iter().filter(|given| **given).count() != 1 {
-        issues.push(Issue::new(&path, "expected one of count, density and position"));
+        issues.push(Issue::new(&path, "expected one of count, density and position, or arrivals"));
+    }
+    if thing.rate.is_some() && thing.count.is_none() && thing.density.is_none() {
+        issues.push(Issue::new(format!("{path}.rate"), "says how many of a count come in a second; give count, or leave it out"));
     }
     if thing.position.is_empty() && (thing.area.len() < 2 || thing.floor() <= 0.0) {
         let message = "expected two opposite corners of a rectangle, or at least three corners of a polygon, around some floor";
@@ -163,6 +219,74 @@ fn check_crowd(thing: &Crowd, plan: Option<&Floors>, issues: &mut Vec<Issue>) {
     for (k, name) in thing.exit.iter().enumerate().filter(|(_, name)| !names.contains(&name.as_str())) {
         let message = format!("\"{name}\" is no exit of the plan, expected one of {}", names.join(", "));
         issues.push(Issue::new(format!("{path}.exit[{k}]"), message));
+    }
+    for (k, name) in thing.goals.iter().enumerate() {
+        if plan.is_some_and(|plan| goal(plan, name).is_none()) {
+            let names = plan.into_iter().flat_map(|plan| {
+                let doors = plan.door.iter().map(|door| door.name.as_str());
+                doors.chain(plan.waypoint.iter().map(|w| w.name.as_str()))
+            });
+            let message =
+                format!("\"{name}\" is no door or waypoint of the plan, expected one of {}", names.collect::<Vec<_>>().join(", "));
+            issues.push(Issue::new(format!("{path}.goals[{k}]"), message));
+        }
+    }
+    check_distributions(thing, issues);
+}
+
+/// Distributions of a crowd that contradict each other.
+fn check_distributions(thing: &Crowd, issues: &mut Vec<Issue>) {
+    let path = format!("crowd \"{}\"", thing.name);
+    let two = [
+        ("radius_deviation", thing.radius_deviation > 0.0 && thing.radius_spread > 0.0, "radius_spread"),
+        ("speed_spread", thing.speed_spread.is_some() && thing.speed_deviation.is_some(), "speed_deviation"),
+        ("reaction_deviation", thing.reaction_deviation > 0.0 && thing.reaction_spread > 0.0, "reaction_spread"),
+        ("preset", thing.preset.is_some() && thing.speed_spread.is_some(), "speed_spread"),
+        ("preset", thing.preset.is_some() && thing.speed_deviation.is_some(), "speed_deviation"),
+    ];
+    for (word, _, other) in two.into_iter().filter(|(_, both, _)| *both) {
+        issues.push(Issue::new(format!("{path}.{word}"), format!("given with {other}; leave one of them out")));
+    }
+    if smallest(thing) < 0.05 {
+        let message = format!("radii down to {} m, expected at least 0.05 m; take a smaller deviation or spread", short(smallest(thing)));
+        issues.push(Issue::new(format!("{path}.radius"), message));
+    }
+    if thing.age.is_some() && thing.preset != Some(Preset::Rimea) {
+        issues.push(Issue::new(format!("{path}.age"), "says nothing without preset = \"rimea\"; set it, or leave age out"));
+    }
+    if let Some([low, high]) = thing.age
+        && low > high
+    {
+        issues.push(Issue::new(format!("{path}.age"), format!("{} to {}, expected the lower age first", short(low), short(high))));
+    }
+}
+
+/// Slopes without floor or direction, hours in which nothing changes, and names that are given twice.
+fn check_places(thing: &Floors, issues: &mut Vec<Issue>) {
+    for (path, polygon, up) in areas(thing) {
+        if polygon.len() < 3 || floor(&polygon) <= 0.0 {
+            issues.push(Issue::new(
+                format!("{path}.area"),
+                "expected two opposite corners of a rectangle, or at least three corners of a polygon",
+            ));
+        }
+        if up == [0.0; 2] {
+            issues.push(Issue::new(format!("{path}.up"), "[0, 0], expected the direction in which it rises"));
+        }
+    }
+    for (path, gate) in gates(thing) {
+        if let [Some(opens), Some(closes)] = gate.hours
+            && opens == closes
+        {
+            issues.push(Issue::new(format!("{path}.closes"), format!("{} s, when it opens, too; give another time", short(closes))));
+        }
+    }
+    for (k, waypoint) in thing.waypoint.iter().enumerate() {
+        let others = thing.door.iter().chain(&thing.exit).map(|gate| &gate.name).chain(thing.waypoint[..k].iter().map(|w| &w.name));
+        if others.into_iter().any(|name| *name == waypoint.name) {
+            let path = format!("plan \"{}\".waypoint[{k}]", thing.name);
+            issues.push(Issue::new(path, format!("\"{}\" is the name of something else, too; give it another", waypoint.name)));
+        }
     }
 }
 
@@ -197,8 +321,10 @@ impl MethodRules for Rules {
                 let message = format!("{} plans, expected one [[plan]] with the walls, doors and exits of its floor", floors.len());
                 issues.push(Issue::new(format!("system \"{}\"", plan.name), message));
             }
+            check_model(plan, issues);
             let radius = crowds.iter().map(|thing| largest(thing)).fold(0.0, f64::max);
             for thing in &floors {
+                check_places(thing, issues);
                 check_walls(thing, issues);
                 check_gates(thing, radius, issues);
                 if thing.exit.is_empty() {
@@ -243,7 +369,8 @@ impl MethodRules for Rules {
             };
             span(0) * span(1)
         };
-        let ways = scene.crowd.len().max(1) as f64;
+        let of = |thing: &Crowd| (1 + thing.goals.len() + if thing.choice == Choice::Quickest { thing.exit.len() } else { 0 }) as f64;
+        let ways = scene.crowd.iter().map(of).sum::<f64>().max(1.0);
         PERSON * people + (CELL[0] + CELL[1] * ways) * scene.plan.iter().map(cells).sum::<f64>()
     }
 
@@ -254,21 +381,24 @@ impl MethodRules for Rules {
             return None;
         }
         let thing = *floors.first()?;
-        let model = model(plan);
+        let model = model(&plan.crowd.clone().unwrap_or_default());
         let gates: Vec<Gate> = gates(thing).into_iter().map(|(_, gate)| gate).collect();
-        let exits_of = |crowd: &Crowd| {
+        let goals = |crowd: &Crowd| {
             let may = |gate: &Gate| gate.exit && (crowd.exit.is_empty() || crowd.exit.contains(&gate.name));
-            (0..gates.len()).filter(|g| may(&gates[*g])).collect::<Vec<usize>>()
+            let exits = (0..gates.len()).filter(|g| may(&gates[*g])).collect();
+            let goals: Vec<Goal> = crowd.goals.iter().filter_map(|name| goal(thing, name)).chain([Goal::Exits(exits)]).collect();
+            (goals, crowd.choice == Choice::Quickest)
         };
-        let exits: Vec<Vec<usize>> = crowds.iter().map(|crowd| exits_of(crowd)).collect();
+        let (journeys, targets) = journeys(crowds.iter().map(|crowd| goals(crowd)).collect());
         let radius = crowds.iter().map(|crowd| largest(crowd)).fold(0.05, f64::max);
-        let fastest = crowds.iter().map(|crowd| crowd.speed + 2.0 * crowd.speed_deviation).fold(0.0, f64::max);
-        let walls = Walls::new(lines(&walls(thing)), gates, reach(fastest, radius, &model));
-        let floor = Floor::new(walls, &exits, side(&crowds), radius);
-        let mut people = Vec::new();
-        for (k, crowd) in crowds.iter().enumerate() {
-            populate(crowd, k as u32, &floor, scene.seed, &mut people, &mut builder.issues);
-        }
+        let fastest = crowds.iter().map(|crowd| top_speed(crowd)).fold(0.0, f64::max);
+        let timed = gates.iter().any(|gate| gate.hours != [None; 2]);
+        let walls = Walls::new(lines(&walls(thing)), gates, model.reach(fastest, radius)).with_slopes(slopes(thing));
+        // People have a way if they have one while all is open.
+        let side = side(&crowds);
+        let open = timed.then(|| Floor::new(walls.clone().without_hours(), targets.clone(), side, radius));
+        let floor = Floor::new(walls, targets, side, radius);
+        let (people, arrivals) = fill(&crowds, thing, &journeys, &floor, open.as_ref().unwrap_or(&floor), scene.seed, &mut builder.issues);
         let settings = Settings {
             name: plan.name.clone(),
             substeps: plan.substeps,
@@ -276,82 +406,14 @@ impl MethodRules for Rules {
             model,
             plan: thing.name.clone(),
             crowds: crowds.iter().map(|crowd| crowd.name.clone()).collect(),
-            exits,
+            journeys,
         };
-        Some(Box::new(People::new(settings, floor, people)))
+        Some(Box::new(People::new(settings, floor, people, arrivals)))
     }
 }
 
 /// Side of a cell for bodies of these crowds [m].
 fn side(crowds: &[&Crowd]) -> f64 {
-    let smallest = crowds.iter().map(|crowd| crowd.radius * (1.0 - crowd.radius_spread)).fold(f64::INFINITY, f64::min);
+    let smallest = crowds.iter().map(|crowd| smallest(crowd)).fold(f64::INFINITY, f64::min);
     (SIDE[1] * smallest).min(SIDE[0])
-}
-
-/// Adds the people of a crowd to those who are there.
-fn populate(thing: &Crowd, crowd: u32, floor: &Floor, seed: u32, people: &mut Vec<Person>, issues: &mut Vec<Issue>) {
-    let path = format!("crowd \"{}\"", thing.name);
-    let random = Random::new(seed, &thing.name);
-    let radius = |i: usize| thing.radius * (1.0 + thing.radius_spread * (2.0 * random.uniform(i as u64, 0, RADIUS)[0] - 1.0));
-    let places = if thing.position.is_empty() {
-        let polygon = thing.polygon();
-        let count = thing.people() as usize;
-        let room = Room { polygon: &polygon, count, radius: largest(thing), crowd };
-        let there: Vec<(Point, f64)> = people.iter().map(|p: &Person| (p.x, p.radius)).collect();
-        match room.places(floor, &random, &there) {
-            Ok(places) => places,
-            Err(Misfit::NoWay) => {
-                let message = "no exit of it can be reached from there: walls or narrow doors cut it off; open a way, or name another exit";
-                return issues.push(Issue::new(format!("{path}.area"), message));
-            }
-            Err(Misfit::Most(most)) => {
-                let message = format!("{count} people, but at most {most} fit there; take fewer, or a larger area");
-                return issues.push(Issue::new(format!("{path}.area"), message));
-            }
-        }
-    } else {
-        check_places(thing, crowd, floor, people, &radius, issues);
-        thing.position.clone()
-    };
-    for (i, x) in places.into_iter().enumerate() {
-        let down = floor.way(crowd).direction(x);
-        let speed = (thing.speed + thing.speed_deviation * normal(&random, i as u64)).max(0.1 * thing.speed);
-        people.push(Person {
-            x,
-            v: [0.0; 2],
-            heading: atan2(down[1], down[0]),
-            phi: floor.way(crowd).distance(x),
-            radius: radius(i),
-            speed,
-            starts: thing.reaction + thing.reaction_spread * random.uniform(i as u64, 0, REACTION)[0],
-            started: false,
-            out: None,
-            id: people.len() as u32,
-            crowd,
-        });
-    }
-}
-
-/// A number of the standard normal distribution, cut at 2, by Box and Muller.
-fn normal(random: &Random, i: u64) -> f64 {
-    let [u, v, ..] = random.uniform(i, 0, SPEED);
-    ((-2.0 * ln(1.0 - u)).sqrt() * cos(std::f64::consts::TAU * v)).clamp(-2.0, 2.0)
-}
-
-/// Given positions where somebody cannot be.
-fn check_places(thing: &Crowd, crowd: u32, floor: &Floor, people: &[Person], radius: &dyn Fn(usize) -> f64, issues: &mut Vec<Issue>) {
-    let own = thing.position.iter().enumerate().map(|(i, x)| (*x, radius(i)));
-    let overlap = overlapping(&people.iter().map(|p| (p.x, p.radius)).chain(own).collect::<Vec<_>>());
-    for (i, x) in thing.position.iter().enumerate() {
-        let path = format!("crowd \"{}\".position[{i}]", thing.name);
-        let clear = floor.plan.clearance(*x);
-        if clear < radius(i) {
-            let message = format!("{} m from a wall, but the body has a radius of {} m; move it", short(clear), short(radius(i)));
-            issues.push(Issue::new(path, message));
-        } else if !floor.way(crowd).distance(*x).is_finite() {
-            issues.push(Issue::new(path, "no exit of it can be reached from there; open a way, or name another exit"));
-        } else if overlap[people.len() + i] {
-            issues.push(Issue::new(path, "overlaps somebody who stands there already; move it"));
-        }
-    }
 }

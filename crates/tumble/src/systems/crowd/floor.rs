@@ -1,0 +1,82 @@
+//! A plan with the ways across it, and which of its gates are open when.
+
+use super::plan::{Gate, Plan};
+use super::way::{Cells, Target, Way};
+
+/// How far from a gate people are near it [m].
+pub const NEAR: f64 = 1.0;
+
+/// A plan at a time, with the ways across it.
+pub struct Floor {
+    /// Walls and gates; closed ones are walls.
+    pub plan: Plan,
+    /// Floor [m²] on both sides of each gate.
+    pub areas: Vec<[f64; 2]>,
+    /// The plan with all gates open.
+    open: Plan,
+    /// Which gates are closed.
+    closed: Vec<bool>,
+    /// What each way leads to.
+    targets: Vec<Vec<Target>>,
+    ways: Vec<Way>,
+    /// Distance of the middle of each gate to the end of each way [m].
+    gates: Vec<Vec<f64>>,
+    /// Side of a cell, and the largest radius of a body [m].
+    sizes: [f64; 2],
+}
+
+impl Floor {
+    /// The floor at t = 0 with ways to these targets, in cells of this side [m], for bodies of up to this radius [m].
+    pub fn new(plan: Plan, targets: Vec<Vec<Target>>, side: f64, radius: f64) -> Self {
+        let mut cells = Cells::new(&plan, side, radius);
+        let areas = plan.gates.iter().map(|gate| cells.floor(&plan, gate, NEAR)).collect();
+        let closed: Vec<bool> = plan.gates.iter().map(|gate| gate.is_closed(0.0)).collect();
+        let (ways, gates) = (Vec::new(), Vec::new());
+        let mut floor = Self { plan: plan.clone(), areas, open: plan, closed, targets, ways, gates, sizes: [side, radius] };
+        if floor.closed.contains(&true) {
+            floor.replan();
+        } else {
+            floor.find_ways(cells);
+        }
+        floor
+    }
+
+    /// Opens and closes gates as they are at t [s]; whether one of them changed.
+    pub fn keep_hours(&mut self, t: f64) -> bool {
+        let same = self.open.gates.iter().zip(&self.closed).all(|(gate, closed)| gate.is_closed(t) == *closed);
+        if !same {
+            self.closed = self.open.gates.iter().map(|gate| gate.is_closed(t)).collect();
+            self.replan();
+        }
+        !same
+    }
+
+    /// A plan on which the closed gates are walls, and the ways across it.
+    fn replan(&mut self) {
+        self.plan = self.open.with_closed(&self.closed);
+        let cells = Cells::new(&self.plan, self.sizes[0], self.sizes[1]);
+        self.find_ways(cells);
+    }
+
+    fn find_ways(&mut self, mut cells: Cells) {
+        let (plan, radius) = (&self.plan, self.sizes[1]);
+        self.ways = self.targets.iter().map(|targets| Way::new(plan, &mut cells, targets, radius)).collect();
+        let middle = |gate: &Gate| [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
+        self.gates = self.ways.iter().map(|way| plan.gates.iter().map(|gate| way.distance(middle(gate))).collect()).collect();
+    }
+
+    /// How many ways there are.
+    pub fn count(&self) -> usize {
+        self.ways.len()
+    }
+
+    /// A way by its number.
+    pub fn way(&self, way: u32) -> &Way {
+        &self.ways[way as usize]
+    }
+
+    /// Distance of a gate to the end of a way [m].
+    pub fn gate(&self, way: u32, gate: usize) -> f64 {
+        self.gates[way as usize][gate]
+    }
+}

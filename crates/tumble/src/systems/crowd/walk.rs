@@ -1,0 +1,154 @@
+//! Everybody's walk: who comes, steps, who crosses gates, reaches goals and leaves, and what is counted.
+
+use super::arrivals::Arrivals;
+use super::floor::Floor;
+use super::journey::{Goal, Leg, choose};
+use super::models::Model;
+use super::near::Near;
+use super::people::{Move, Person, Scratch, step};
+use super::plan::{Point, length, sub};
+use super::tally::{Share, Tally};
+use crate::math::parallel::max;
+
+/// How far people go on beyond an exit, in the way of who follows [m], and for how long at most [s].
+const BEYOND: f64 = 1.0;
+const PATIENCE: f64 = 3.0;
+
+/// People on a floor.
+pub struct Walk {
+    pub floor: Floor,
+    pub model: Model,
+    /// Where each crowd goes.
+    pub journeys: Vec<Vec<Leg>>,
+    /// Who comes later.
+    pub arrivals: Vec<Arrivals>,
+    /// Who is there, and who has just left, in the order of numbers.
+    pub people: Vec<Person>,
+    /// When the last step began [s].
+    pub time: f64,
+    /// Time lost by all so far [s].
+    pub lost: f64,
+    pub tally: Tally,
+    scratch: Scratch,
+    /// Places and distances left before a step.
+    before: Vec<(Point, f64)>,
+}
+
+impl Walk {
+    /// People on a floor.
+    pub fn new(floor: Floor, model: Model, journeys: Vec<Vec<Leg>>, people: Vec<Person>, arrivals: Vec<Arrivals>) -> Self {
+        let tally = Tally::new(floor.plan.gates.len());
+        let (scratch, before) = (Scratch::default(), Vec::new());
+        Self { floor, model, journeys, arrivals, people, time: 0.0, lost: 0.0, tally, scratch, before }
+    }
+
+    /// A step of h [s] from t.
+    pub fn step(&mut self, t: f64, h: f64) {
+        self.time = t;
+        if self.floor.keep_hours(t) {
+            self.replan();
+        }
+        for arrivals in &mut self.arrivals {
+            arrivals.come(&mut self.people, &self.floor, t, (t / h).round() as u32);
+        }
+        let mut shares = choose(&mut self.people, &self.floor, &self.journeys, t, h);
+        self.before.clear();
+        self.before.extend(self.people.iter().map(|p| (p.x, p.phi)));
+        step(&mut self.people, &self.floor, &self.model, &mut self.scratch, t, h);
+        let moves = std::mem::take(&mut self.scratch.moves);
+        let queues = self.tally.queues(&self.floor, &self.people, &moves, h);
+        let mut gone = Vec::new();
+        for (i, to) in moves.iter().enumerate() {
+            let p = &mut self.people[i];
+            if p.out.is_some() {
+                p.phi = to.phi;
+                if p.phi < -BEYOND || t - p.starts > PATIENCE {
+                    gone.push(p.id);
+                }
+            } else {
+                shares.extend(self.arrive(i, to, t, h));
+            }
+        }
+        self.scratch.moves = moves;
+        self.lost += shares.iter().map(|share| share.lost).sum::<f64>();
+        self.tally.charge(&shares, &queues);
+        if !gone.is_empty() {
+            self.people.retain(|p| gone.binary_search(&p.id).is_err());
+        }
+    }
+
+    /// What a step meant to somebody: what was crossed, whether a leg of the journey ends, and the time that was lost.
+    fn arrive(&mut self, i: usize, to: &Move, t: f64, h: f64) -> Option<Share> {
+        let (p, (x, phi)) = (&mut self.people[i], self.before[i]);
+        let legs = &self.journeys[p.crowd as usize];
+        // Time taken, and distance left on the leg that the step began on.
+        let (mut took, mut left) = (h, to.phi);
+        p.phi = to.phi;
+        let crossings = if to.crosses { self.tally.cross(&self.floor, x, p.x, t, h) } else { Vec::new() };
+        for (s, g, e) in crossings {
+            match &legs[p.leg as usize].goal {
+                Goal::Exits(exits) if exits.contains(&g) => {
+                    (took, left) = (s * h, 0.0);
+                    (p.out, p.starts, p.phi) = (Some(e), t, 0.0);
+                    break;
+                }
+                Goal::Gate(goal) if *goal == g => {
+                    left = (s - 1.0) * length(sub(p.x, x));
+                    p.leg += 1;
+                    (p.way, p.phi) = legs[p.leg as usize].shortest(&self.floor, p.x);
+                }
+                _ => {}
+            }
+        }
+        if let Goal::Place(goal, radius) = legs[p.leg as usize].goal
+            && length(sub(p.x, goal)) <= radius
+        {
+            p.leg += 1;
+            (p.way, p.phi) = legs[p.leg as usize].shortest(&self.floor, p.x);
+        }
+        let nearer = if phi.is_finite() && left.is_finite() { phi - left } else { 0.0 };
+        p.started.then(|| Share { gate: to.gate, lost: took - nearer / p.speed, waited: if p.waits() { took } else { 0.0 } })
+    }
+
+    /// Distances and ways on a plan whose gates have opened or closed.
+    fn replan(&mut self) {
+        for p in self.people.iter_mut().filter(|p| p.out.is_none()) {
+            let before = p.phi;
+            p.phi = self.floor.way(p.way).distance(p.x);
+            if p.phi.is_infinite() {
+                (p.way, p.phi) = self.journeys[p.crowd as usize][p.leg as usize].shortest(&self.floor, p.x);
+            }
+            if before.is_finite() && p.phi.is_finite() {
+                self.lost += (p.phi - before) / p.speed;
+            }
+        }
+    }
+
+    /// Who has not left.
+    pub fn present(&self) -> impl Iterator<Item = &Person> {
+        self.people.iter().filter(|p| p.out.is_none())
+    }
+
+    /// How many are still to come.
+    pub fn expected(&self) -> usize {
+        self.arrivals.iter().map(|arrivals| arrivals.people.len() - arrivals.come).sum()
+    }
+
+    /// How many have no way to where they go.
+    pub fn stranded(&self) -> usize {
+        self.present().filter(|p| p.phi == f64::INFINITY).count()
+    }
+
+    /// The deepest overlap of two bodies, or of a body and a wall [m].
+    pub fn deepest(&self) -> f64 {
+        let mut near = Near::default();
+        let range = 2.0 * self.people.iter().map(|p| p.radius).fold(0.0, f64::max);
+        near.sort(range.max(0.1), self.people.iter().map(|p| p.x));
+        let deepest = |p: &Person| {
+            let others = near.runs(p.x, range).flat_map(|run| &near.order[run]).map(|row| &self.people[*row as usize]);
+            let overlap = |o: &Person| if o.id == p.id { 0.0 } else { p.radius + o.radius - length(sub(o.x, p.x)) };
+            others.map(overlap).fold(p.radius - self.floor.plan.clearance(p.x), f64::max)
+        };
+        max(self.people.len(), |range| self.people[range].iter().map(deepest).fold(0.0, f64::max)).max(0.0)
+    }
+}
