@@ -6,7 +6,21 @@ import type { Column, Form, Frame, Numbers, SceneInfo, Sight, Vector } from "../
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { Depths } from "./depths";
 import { Instances } from "./instances";
-import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars, Water } from "./layers";
+import {
+  type Grid,
+  gridOf,
+  type Layer,
+  PIXELS,
+  Pieces,
+  PlaneField,
+  Points,
+  Range,
+  type Rgb,
+  SpaceField,
+  Surface,
+  scalars,
+  Water,
+} from "./layers";
 import { LOOK, type Look } from "./look";
 import { along, arrows, carry, ground, outline, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
@@ -20,7 +34,7 @@ interface Thing extends Shaded {
   trail: number;
   leap: number;
   grid: Grid | null;
-  body?: Points | Surface | Instances | PlaneField | SpaceField | Pieces;
+  body?: Points | Surface | Water | Instances | PlaneField | SpaceField | Pieces;
   links?: Pieces;
   way?: Pieces;
   arrows?: Pieces;
