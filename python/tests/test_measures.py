@@ -139,6 +139,7 @@ def test_every_column_is_described() -> None:
         {"gas": [GAS | {"fire": {}, "temperature": {}}]},
         {"body": [{"name": "box", "shape": {"box": {"size": [1, 1, 1]}}}]},
         {"heat": [hot]},
+        {"liquid": [{"name": "water", "box": GAS["box"], "fill": [{"shape": {"sphere": {"radius": 0.3}}}]}]},
         {"compressible": [GAS | {"sound_speed": 300.0, "density": 1.0}]},
         {
             "plan": [

@@ -50,7 +50,6 @@ BEGINNINGS = {
     "liquid/bath": 3,
     "liquid/dam": 6,
     "liquid/drop": 5,
-    "liquid/honey": 6,
     "liquid/pour": 5,
     "liquid/raft": 2,
     "liquid/tension": 4,
