@@ -201,7 +201,7 @@ fn a_disc_that_turns_keeps_its_angular_momentum_by_affine_transfers() {
         let fill = "{ shape.sphere.radius = 0.15, velocity = [\"z\", 0, \"-x\"] }";
         let mut sim = simulation(&format!(
             "dimension = 2\nworld.gravity = [0, 0, 0]\ntime.fps = {fps}\n[[liquid]]\nname = \"water\"\ntransfer = \"{transfer}\"\n\
-             box = {{ size = [1, 1, 1], resolution = 128 }}\nfill = [{fill}]\n"
+             box = {{ size = [2, 1, 2], resolution = 256 }}\nfill = [{fill}]\n"
         ));
         let start = sim.ledger();
         run(&mut sim, 20);
@@ -285,8 +285,8 @@ fn what_is_not_there_or_cannot_be_is_refused() {
         (fill("{ shape = { floor = {} }, velocity = [\"1/(x - x)\", 0, 0] }"), "liquid \"water\".fill", "finite"),
         (fill(small) + "flip_ratio = 0.9\n", "liquid \"water\".flip_ratio", "transfer = \"flip\""),
         (fill(small) + ball, "liquid \"water\".fill[0].shape", "colliders"),
-        (fill(small) + "viscosity = 1.0\n", "liquid \"water\".viscosity", "unknown key"),
-        (fill(small) + "bodies = [\"a\"]\n", "liquid \"water\".bodies", "unknown key"),
+        (fill(small) + "thickness = 1.0\n", "liquid \"water\".thickness", "unknown key"),
+        (fill(small) + "bodies = [\"a\"]\n", "liquid \"water\".bodies[0]", "no object"),
         (fill(small) + "[[force]]\nkind = \"drag\"\nrate = 1\non = [\"water\"]\n", "force[0].on", "no force"),
         (fill(small) + "[[system]]\nmethod = \"liquid\"\nintegrator = \"rk4\"\n", "system \"main\".integrator", "no integrator"),
     ] {
