@@ -1,7 +1,7 @@
 """Flow, density and speed at a gate from the ways of people, as PedPy has them.
 
 N(t) counts who has crossed a line, each person once. The Voronoi cell of a person is what of the floor is nearer to it than to
-others and is joined to its place within the cell; its density is one over the area of that (crowds.8) [steffen2010]. Cells are
+others and is joined to its place within the cell; its density is one over the area of that (crowds.13) [steffen2010]. Cells are
 counted on squares of SIDE: the error of a mean over some seconds is below 1 %.
 """
 
