@@ -37,6 +37,8 @@ def sources(scene: Tree) -> list[str]:
     found += [f'collider "{c["name"]}"' for c in scene["collider"] if _moves(c)]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"]]
     found += [f'gas "{g["name"]}"' for g in scene["gas"] if g.get("bodies") or g.get("sheet")]
+    # The energy of a surface under tension is not in the ledger, and what comes in brings its own.
+    found += [f'liquid "{f["name"]}"' for f in scene["liquid"] if f["surface_tension"] or f["inflow"]]
     found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _inflates(thing.get("pressure"))]
     return found + _driven(scene)
 
