@@ -213,8 +213,7 @@ impl Viscosity {
             rz = after;
         }
         report.linear += iterations;
-        // NaN is no solution, too.
-        report.unconverged += u64::from(!(rz <= enough));
+        report.unconverged += u64::from(rz > enough || rz.is_nan());
         for (axis, part) in self.grid.axes().zip(&mut u.parts) {
             let (free, x) = (&self.inverse[axis], &x[axis]);
             chunks(&mut part.data, |start, u| {
