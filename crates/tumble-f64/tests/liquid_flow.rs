@@ -122,9 +122,9 @@ fn a_film_starts_to_flow_as_its_series_says() {
 #[test]
 fn a_viscous_wave_fades_as_its_closed_form_says() {
     // Free slip: exp(-2 nu k² t) [lamb1932].
-    let (k, g, nu, depth) = (PI, 9.8, 0.01, 0.5);
-    let omega = (g * k * (k * depth as f64).tanh()).sqrt();
-    let a = 0.04 * omega / (k * (k * depth as f64).sinh());
+    let (k, g, nu, depth): (f64, f64, f64, f64) = (PI, 9.8, 0.01, 0.5);
+    let omega = (g * k * (k * depth).tanh()).sqrt();
+    let a = 0.04 * omega / (k * (k * depth).sinh());
     let make = |nu: f64| {
         let velocity =
             format!("[\"-{a}*{k}*sin({k}*x)*(exp({k}*z)+exp(-{k}*z))/2\", 0, \"{a}*{k}*cos({k}*x)*(exp({k}*z)-exp(-{k}*z))/2\"]");
