@@ -75,7 +75,11 @@ fn imports(of: &[String], text: &str) -> Vec<Import> {
     let bytes = code.as_bytes();
     let mut i = 0;
     while i < bytes.len() {
-        let rest = &code[i..];
+        // Within a letter that is not of ASCII there is no path.
+        let Some(rest) = code.get(i..) else {
+            i += 1;
+            continue;
+        };
         let starts_word =
             i == 0 || !(bytes[i - 1].is_ascii_alphanumeric() || bytes[i - 1] == b'_' || bytes[i - 1] == b':' || bytes[i - 1] == b'$');
         if starts_word && (rest.starts_with("crate::") || rest.starts_with("super::")) {
