@@ -162,6 +162,7 @@ fn colours_are_handed_out_in_turn_and_all_forms_described() {
         Form::Instances,
         Form::Solid,
         Form::Container,
+        Form::Liquid,
         Form::Ground,
         Form::Image,
         Form::Smoke,

@@ -217,7 +217,7 @@ pub fn resolve(mut scene: Scene) -> Scene {
         }
     }
     scene.system = systems;
-    let immersed = movers::lists(&scene).any(|(_, names)| movers::moves_bodies(&scene, names));
+    let immersed = lists(&scene).any(|(_, names)| moves_bodies(&scene, names));
     let often = if immersed || touches(&scene) { (RATE / scene.time.fps).ceil().clamp(1.0, 1e5) as u32 } else { 1 };
     scene.time.exchanges.get_or_insert(often);
     scene
@@ -232,6 +232,17 @@ pub fn touches(scene: &Scene) -> bool {
 pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
     matches!(mover, Some(Method::Grains | Method::Dynamics))
+}
+
+/// Lists of objects that fluids move as bodies, and where they stand.
+pub fn lists(scene: &Scene) -> impl Iterator<Item = (String, &[String])> {
+    let gases = scene.gas.iter().map(|gas| (format!("gas \"{}\".bodies", gas.name), &gas.bodies[..]));
+    gases.chain(scene.liquid.iter().map(|liquid| (format!("liquid \"{}\".bodies", liquid.name), &liquid.bodies[..])))
+}
+
+/// Whether a fluid moves rigid bodies.
+pub fn moves_bodies(scene: &Scene, names: &[String]) -> bool {
+    names.iter().any(|name| scene.body.iter().any(|thing| thing.name == *name))
 }
 
 /// A system for each method that objects of the scene need.

@@ -93,17 +93,6 @@ fn named(scene: &Scene) -> impl Iterator<Item = &String> {
     gases.chain(scene.liquid.iter().flat_map(|liquid| &liquid.bodies))
 }
 
-/// Lists of objects that fluids move as bodies, and where they stand.
-pub fn lists(scene: &Scene) -> impl Iterator<Item = (String, &[String])> {
-    let gases = scene.gas.iter().map(|gas| (format!("gas \"{}\".bodies", gas.name), &gas.bodies[..]));
-    gases.chain(scene.liquid.iter().map(|liquid| (format!("liquid \"{}\".bodies", liquid.name), &liquid.bodies[..])))
-}
-
-/// Whether a fluid moves rigid bodies.
-pub fn moves_bodies(scene: &Scene, names: &[String]) -> bool {
-    names.iter().any(|name| scene.body.iter().any(|thing| thing.name == *name))
-}
-
 /// What is wrong with bodies that cover no cell.
 pub fn too_small(bodies: &[Immersed], grid: &Grid) -> Vec<String> {
     let least = LEAST_RADIUS * grid.dx;

@@ -1,7 +1,6 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::movers::{lists, moves_bodies};
-use super::{MethodRules, is_in, scheme_of_its_own, touches, visits_bodies};
+use super::{MethodRules, is_in, lists, moves_bodies, scheme_of_its_own, touches, visits_bodies};
 use crate::exchange::{BodyRow, BodySurface};
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};

@@ -1,7 +1,7 @@
 //! People who come later, one after the other, each to a free place of an area.
 
+use super::around::Person;
 use super::floor::Floor;
-use super::people::Person;
 use super::plan::{Point, inside, length, sub};
 use crate::math::Random;
 use crate::math::functions::atan2;

@@ -1,7 +1,7 @@
 //! Where people go: goals in order, then an exit, and which of the exits.
 
+use super::around::Person;
 use super::floor::Floor;
-use super::people::Person;
 use super::plan::Point;
 use super::tally::Share;
 use super::way::Target;

@@ -2,6 +2,7 @@
 //!
 //! All numbers are in double precision, whatever the engine's: places decide who goes first.
 
+mod around;
 mod arrivals;
 mod floor;
 mod journey;
@@ -14,11 +15,11 @@ mod tally;
 mod walk;
 mod way;
 
+pub use around::Person;
 pub use arrivals::Arrivals;
 pub use floor::Floor;
 pub use journey::{Goal, Leg, journeys};
 pub use models::{AnticipationVelocity, CollisionFreeSpeed, Model, Orca, SocialForce};
-pub use people::Person;
 pub use place::{Misfit, Room, overlapping};
 pub use plan::{Gate, Line, Plan, Point, Slope, nearest};
 

@@ -3,8 +3,9 @@
 //! Somebody who gets d nearer to the exit in a step h loses h - d/v0: summed over a way, its time less that of walking it freely. (crowds.7)
 //! It is charged to the next gate on the way, unless people beyond that gate stand, too: then the queue is that of theirs.
 
+use super::around::Person;
 use super::floor::{Floor, NEAR};
-use super::people::{Move, Person};
+use super::people::Move;
 use super::plan::{Point, crossing, length, sub};
 use super::way::{NONE, in_sight};
 

@@ -1,11 +1,12 @@
 //! Everybody's walk: who comes, steps, who crosses gates, reaches goals and leaves, and what is counted.
 
+use super::around::Person;
 use super::arrivals::Arrivals;
 use super::floor::Floor;
 use super::journey::{Goal, Leg, choose};
 use super::models::Model;
 use super::near::Near;
-use super::people::{Move, Person, Scratch, step};
+use super::people::{Move, Scratch, step};
 use super::plan::{Point, length, sub};
 use super::tally::{Share, Tally};
 use crate::math::parallel::max;

@@ -3,7 +3,7 @@
 //! Source: [tordeux2016], with steering by rotation, after the description of the third version of that model in the documentation of
 //! JuPedSim, [jupedsim2026].
 
-use super::super::people::Around;
+use super::super::around::Around;
 use super::super::plan::{Point, along, cross, dot, length};
 use super::Motion;
 use crate::math::functions::{atan2, cos, exp, sin};

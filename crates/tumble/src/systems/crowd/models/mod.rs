@@ -10,7 +10,7 @@ pub use collision_free_speed::CollisionFreeSpeed;
 pub use orca::Orca;
 pub use social_force::SocialForce;
 
-use super::people::Around;
+use super::around::Around;
 use super::plan::Point;
 
 /// What somebody is about to do.

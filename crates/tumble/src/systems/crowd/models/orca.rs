@@ -2,7 +2,7 @@
 //!
 //! Source: [vandenberg2011].
 
-use super::super::people::{Around, Neighbour};
+use super::super::around::{Around, Neighbour};
 use super::super::plan::{Point, along, cross, dot, length, sub};
 use super::Motion;
 use crate::math::functions::atan2;

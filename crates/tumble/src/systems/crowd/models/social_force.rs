@@ -2,7 +2,7 @@
 //!
 //! Sources: [helbing2000] for the desired velocity, walls and contact, [moussaid2009] for what others do at a distance.
 
-use super::super::people::{Around, Neighbour};
+use super::super::around::{Around, Neighbour};
 use super::super::plan::{Point, along, cross, dot, length, sub};
 use super::Motion;
 use crate::math::functions::{atan2, exp};
