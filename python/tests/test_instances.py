@@ -59,7 +59,7 @@ def test_all_bodies_are_one_mesh_with_sharp_edges() -> None:
     run = fake_run.boxes()
     for i in (0, 3):
         mesh = next(t for t in Stage(run).things(i) if t.name == "boxes")
-        assert isinstance(mesh, Mesh) and mesh.closed and not mesh.fabric
+        assert isinstance(mesh, Mesh) and mesh.closed and mesh.matter == "plain"
         assert mesh.vertices.shape == mesh.normals.shape == (48, 3) and mesh.triangles.shape == (24, 3)
         triangles = run.static["boxes"]["triangles"].astype(int)
         both = corners(run, i)[np.concatenate([triangles, triangles + 8])]

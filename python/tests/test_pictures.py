@@ -488,7 +488,7 @@ def test_cloth_is_as_thick_as_contact_keeps_it_apart() -> None:
     run.scene["system"] = [{"name": "soft", "method": "dynamics", "self_contact": {"thickness": 0.01}}]
 
     def thickness() -> float:
-        return next(t.thickness for t in Stage(run).things(0) if isinstance(t, Mesh) and t.fabric)
+        return next(t.thickness for t in Stage(run).things(0) if isinstance(t, Mesh) and t.matter == "fabric")
 
     assert thickness() == 0.01
     run.scene["collider"][0]["thickness"] = 0.002

@@ -27,7 +27,7 @@ from test_disks import fill_disk
 
 from tumble import ExportError, Run, Scene, SceneError, sweep
 from tumble.run import simulate
-from tumble.sweeps import cluster, design, measures, pool, study, task
+from tumble.sweeps import cluster, design, engines, measures, pool, study, task
 from tumble.sweeps.result import Sweep
 from tumble.sweeps.store import Store
 
@@ -116,7 +116,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[pool.Pool]:
             super().__init__(*words)
             made.append(self)
 
-    monkeypatch.setattr(study, "Pool", Seen)
+    monkeypatch.setattr(engines, "Pool", Seen)
     return made
 
 
