@@ -129,7 +129,7 @@ def test_the_surface_is_that_of_another_program(run: Run) -> None:
 
 
 def test_the_dam_of_the_laboratory(tumble: Callable[..., Answer], tmp_path: Path) -> None:
-    done = tumble("lab", "dam", "--cells", 24, "--out", tmp_path / "dam")
+    done = tumble("lab", "dam", "--cells", 16, "--out", tmp_path / "dam")
     assert done.code == 0, done.err
     page = (tmp_path / "dam/dam.html").read_text(encoding="utf-8")
     for name in ("PIC", "FLIP", "APIC", "position-based"):
