@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { DRAWN_ON, FOG, GLOWING, GROUND, MATTER, SHADE, SIGNED, SOLID, SPRING, TRAIL } from "../engine/looks";
-import type { Column, Form, Frame, Numbers, SceneInfo, Sight, Vector } from "../engine/protocol";
+import type { Column, Frame, Numbers, SceneInfo, Sight, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { Depths } from "./depths";
 import { Instances } from "./instances";
@@ -23,31 +23,12 @@ import {
 } from "./layers";
 import { LOOK, type Look } from "./look";
 import { along, arrows, carry, ground, outline, sharp, shownOf } from "./scenery";
-import { isLeft, type Legend, type Shaded, Shades } from "./shades";
+import { isLeft, type Legend, Shades } from "./shades";
+import { isLine, isSkin, isSolid, type Thing } from "./thing";
 import { trails } from "./trails";
 import { fitting, lit } from "./vantage";
 
-interface Thing extends Shaded {
-  form: Form;
-  color: Rgb;
-  radius: number;
-  trail: number;
-  leap: number;
-  grid: Grid | null;
-  body?: Points | Surface | Water | Instances | PlaneField | SpaceField | Pieces;
-  links?: Pieces;
-  way?: Pieces;
-  arrows?: Pieces;
-  ranges: Map<string, Range>;
-  plane?: THREE.Mesh;
-  at?: [THREE.Vector3, THREE.Vector3];
-}
-
 type Entry = Record<string, any>;
-
-const isLine = (form: Form) => form === "curve" || form === "strands";
-const isSkin = (form: Form) => form === "surface" || form === "body";
-const isSolid = (form: Form) => form === "solid" || form === "container";
 
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
