@@ -125,7 +125,7 @@ addEventListener("drop", (event) => {
   event.preventDefault();
   const files = [...(event.dataTransfer?.files ?? [])];
   if (files.length)
-    void import("./drop").then(({ acceptFiles }) => acceptFiles(files)).catch((error) => say(String(error.message ?? error)));
+    void import("./files").then(({ acceptFiles }) => acceptFiles(files)).catch((error) => say(String(error.message ?? error)));
 });
 
 addEventListener("hashchange", () => void go());

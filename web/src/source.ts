@@ -1,7 +1,8 @@
 /** Start of a scene page: a bundled scene, a file, a link; and how it is opened. */
-import { opened } from "./drop";
+
 import { EngineError } from "./engine/client";
 import type { Files, Value } from "./engine/protocol";
+import { opened } from "./files";
 import { sceneOf } from "./scenes";
 import { engine, resolved, type Session } from "./session";
 import { LONGEST, pack, type Shared, toFile, unpack } from "./share";

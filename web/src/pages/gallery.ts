@@ -1,6 +1,6 @@
 /** All scenes that ship, with pictures. */
 import { h, type Page, say } from "../dom";
-import { acceptFiles } from "../drop";
+import { acceptFiles } from "../files";
 import { rowTitle, SCENES, type Shipped } from "../scenes";
 
 export const page: Page = async (main) => {

@@ -1,11 +1,11 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { Comparison } from "../compare";
 import { check, choice, h, ICONS, iconButton, type Page, saveAs, say, show, svg } from "../dom";
-import { want } from "../drop";
 import type { Editor } from "../editor";
 import { EngineError } from "../engine/client";
 import type { Cure, SceneInfo, Value } from "../engine/protocol";
 import { FamilySwitches } from "../families";
+import { want } from "../files";
 import { FAMILIES, familiesOf } from "../links";
 import { Panel } from "../panel";
 import { type Curve, legend, Plot } from "../plot";
