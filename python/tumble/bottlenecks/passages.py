@@ -176,7 +176,7 @@ def packed(found: Outcome) -> bytes:
 
 def unpacked(data: bytes) -> Outcome:
     """Raises ValueError where that is none."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as kept:
+    with np.load(io.BytesIO(data)) as kept:
         arrays = {name: kept[name] for name in kept.files}
     seed, left, people = map(int, arrays["whole"])
     last_out, lost = map(float, arrays["parts"])
