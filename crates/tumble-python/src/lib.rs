@@ -43,10 +43,10 @@ mod _engine {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("version", env!("CARGO_PKG_VERSION"))?;
         module.add("commit", option_env!("TUMBLE_COMMIT"))?;
-        // To compare with the engine of browsers, which has no wider registers.
-        if std::env::var("TUMBLE_REGISTERS").is_ok_and(|bits| bits == "128") {
-            tumble::math::simd::hold_to(tumble::math::simd::Level::Narrow);
-            tumble_f64::math::simd::hold_to(tumble_f64::math::simd::Level::Narrow);
+        // To compare with the engine of browsers, whose registers are half as wide.
+        if std::env::var("TUMBLE_REGISTERS").is_ok_and(|bits| bits == "256") {
+            tumble::math::simd::hold_to(tumble::math::simd::Level::Avx2);
+            tumble_f64::math::simd::hold_to(tumble_f64::math::simd::Level::Avx2);
         }
         module.add("instructions", tumble::math::simd::widest().name())?;
         errors::add(module)

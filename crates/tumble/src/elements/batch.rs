@@ -206,7 +206,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             for a in 0..N {
                 w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
             }
-        });
+        }, else Self { range: e..self.range.end, slots: &mut self.slots[(e - self.range.start) * N..], ..self });
     }
 }
 
@@ -244,7 +244,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             for a in 0..N {
                 w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
             }
-        });
+        }, else Self { range: e..self.range.end, slots: &mut self.slots[(e - self.range.start) * N..], ..self });
     }
 }
 

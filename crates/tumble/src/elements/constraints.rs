@@ -182,20 +182,18 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     /// `None` if a node is not one of the rows; `inverse` are the inverse inertias of frames, the rows from `points` on.
     /// The elements of `chains` stand at the end, in order and in no colour.
     fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], chains: &[Range<usize>]) -> Option<Self> {
-        if members.iter().flat_map(|m| m.nodes).any(|i| i as usize >= rows) || rows > points + inverse.len() {
+        let all: Vec<u32> = members.iter().flat_map(|m| m.nodes).collect();
+        if all.iter().any(|i| *i as usize >= rows) || rows > points + inverse.len() {
             return None;
         }
-        let (given, order) = sorted(rows, members, chains);
+        let (given, order) = sorted(rows, N, &all, chains);
         let of = |place: &u32| &members[*place as usize];
         let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { given.iter().map(|e| f(of(e)) as Real).collect() };
         let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
         for (a, index) in nodes.iter_mut().enumerate() {
-            *index = Index::new(given.iter().map(|e| of(e).nodes[a]).collect(), rows)?;
+            *index = node(a, N, &all, &given, rows)?;
         }
-        let inverse = std::array::from_fn(|a| {
-            let of_frame = |i: &u32| inverse.get((*i as usize).wrapping_sub(points)).copied();
-            nodes[a].get().iter().map_while(of_frame).collect()
-        });
+        let inverse = std::array::from_fn(|a| inverses(&nodes[a], points, inverse));
         let damped = members.iter().any(|m| m.damping != 0.0);
         Some(Self {
             runs: runs(&nodes),
@@ -258,10 +256,10 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         unit_frames(frames, out)
     }
 
-    /// Whether a pack is one run.
+    /// Whether a pack of links is one run.
     #[inline(always)]
     fn is_run<W: Width>(&self, _w: W, e: usize) -> bool {
-        N == 2 && usize::from(self.runs[e]) >= W::N
+        usize::from(self.runs[e]) >= W::N
     }
 
     /// Rest numbers and parameters of the law of a pack.
@@ -311,6 +309,17 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     }
 }
 
+/// The node number `a` of `n` of the elements given.
+fn node(a: usize, n: usize, nodes: &[u32], given: &[u32], rows: usize) -> Option<Index> {
+    Index::new(given.iter().map(|e| nodes[n * *e as usize + a]).collect(), rows)
+}
+
+/// Inverse inertias of nodes that are frames, the rows from `points` on; empty for points.
+fn inverses(nodes: &Index, points: usize, inverse: &[Real]) -> Vec<Real> {
+    let of_frame = |i: &u32| inverse.get((*i as usize).wrapping_sub(points)).copied();
+    nodes.get().iter().map_while(of_frame).collect()
+}
+
 /// The `runs` of `Columns`.
 fn runs<const N: usize>(nodes: &[Index; N]) -> Vec<u8> {
     let [first, second] = &nodes[..] else { return Vec::new() };
@@ -332,51 +341,42 @@ struct Order {
     between: Vec<Range<usize>>,
 }
 
-/// Elements in the order in which they are satisfied.
-fn sorted<const N: usize, const D: usize, const P: usize>(
-    rows: usize,
-    members: &[Members<N, D, P>],
-    chains: &[Range<usize>],
-) -> (Vec<u32>, Order) {
-    let mut chained = vec![false; members.len()];
+/// Elements of `n` nodes each, whose rows these are one element after the other, in the order in which they are satisfied.
+fn sorted(rows: usize, n: usize, nodes: &[u32], chains: &[Range<usize>]) -> (Vec<u32>, Order) {
+    let mut chained = vec![false; nodes.len() / n];
     chains.iter().for_each(|chain| chained[chain.clone()].fill(true));
     let mut inside: Vec<Vec<u32>> = vec![Vec::new(); rows.div_ceil(CLUSTER)];
     let mut between = Vec::new();
-    for (e, member) in members.iter().enumerate().filter(|(e, _)| !chained[*e]) {
-        let cluster = member.nodes[0] as usize / CLUSTER;
-        let whole = member.nodes.iter().all(|i| *i as usize / CLUSTER == cluster);
+    for (e, member) in nodes.chunks(n).enumerate().filter(|(e, _)| !chained[*e]) {
+        let cluster = member[0] as usize / CLUSTER;
+        let whole = member.iter().all(|i| *i as usize / CLUSTER == cluster);
         if whole { inside[cluster].push(e as u32) } else { between.push(e as u32) }
     }
-    let mut given = Vec::with_capacity(members.len());
+    let mut given = Vec::with_capacity(chained.len());
     let mut used = vec![0; rows];
-    let clusters = inside.iter().filter(|own| !own.is_empty()).map(|own| colored(own, members, &mut used, &mut given)).collect();
+    let clusters = inside.iter().filter(|own| !own.is_empty()).map(|own| colored(own, n, nodes, &mut used, &mut given)).collect();
     used.fill(0);
-    let between = colored(&between, members, &mut used, &mut given);
+    let between = colored(&between, n, nodes, &mut used, &mut given);
     chains.iter().for_each(|chain| given.extend(chain.clone().map(|e| e as u32)));
     (given, Order { clusters, between })
 }
 
 /// Appends elements by colour, and returns the ranges of the colours: greedily in the order given, each element takes the first colour that
 /// none of its nodes has `used`.
-fn colored<const N: usize, const D: usize, const P: usize>(
-    elements: &[u32],
-    members: &[Members<N, D, P>],
-    used: &mut [u64],
-    given: &mut Vec<u32>,
-) -> Vec<Range<usize>> {
+fn colored(elements: &[u32], n: usize, nodes: &[u32], used: &mut [u64], given: &mut Vec<u32>) -> Vec<Range<usize>> {
     let mut colors: Vec<Vec<u32>> = Vec::new();
     // Elements around a node with more than 64 of them go one by one.
     let mut late: Vec<u32> = Vec::new();
     for e in elements {
-        let member = &members[*e as usize];
-        let taken = member.nodes.iter().fold(0, |t, i| t | used[*i as usize]);
+        let member = &nodes[n * *e as usize..][..n];
+        let taken = member.iter().fold(0, |t, i| t | used[*i as usize]);
         let color = (!taken).trailing_zeros() as usize;
         if color == 64 {
             late.push(*e);
             continue;
         }
-        for i in member.nodes {
-            used[i as usize] |= 1 << color;
+        for i in member {
+            used[*i as usize] |= 1 << color;
         }
         if color == colors.len() {
             colors.push(Vec::new());
@@ -384,7 +384,7 @@ fn colored<const N: usize, const D: usize, const P: usize>(
         colors[color].push(*e);
     }
     for color in &mut colors {
-        color.sort_by_key(|e| members[*e as usize].nodes[0]);
+        color.sort_by_key(|e| nodes[n * *e as usize]);
     }
     colors.extend(late.into_iter().map(|e| vec![e]));
     let mut start = given.len();
@@ -514,9 +514,9 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     type Output = ();
     #[inline(always)]
     fn run<W: Width>(mut self, w: W) {
-        packs!(W, w, self.range.clone(), |e| {
-            if self.columns.is_run(w, e) { self.pack::<_, true>(w, e) } else { self.pack::<_, false>(w, e) }
-        });
+        packs!(W, w, self.range, |e| {
+            if const { N == 2 && W::N > 1 } && self.columns.is_run(w, e) { self.pack::<_, true>(w, e) } else { self.pack::<_, false>(w, e) }
+        }, else Self { range: e..self.range.end, lambda: self.lambda.get_mut(e - self.range.start..).unwrap_or_default(), ..self });
     }
 }
 

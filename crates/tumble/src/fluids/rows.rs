@@ -1,7 +1,7 @@
 //! Rows of cells and faces: sums over them in a fixed order, and the two cells beside a face.
 
 use crate::math::Real;
-use crate::math::parallel::Tasks;
+use crate::math::parallel;
 use crate::state::{Field, Grid};
 
 /// Calls `f(start of the row in data, its points)` for all rows of a field, in parallel; the sum of the results in a fixed order.
@@ -32,7 +32,7 @@ fn fold_rows(field: &Field, zero: f64, join: impl Fn(f64, f64) -> f64 + Sync, f:
     let one = |task: usize| {
         (task * part..((task + 1) * part).min(y * z)).fold(zero, |sum, row| join(sum, f(field.index([0, row % y, row / y]), x)))
     };
-    (0..tasks).map_in_parallel(one).into_iter().fold(zero, join)
+    parallel::map(tasks, one).into_iter().fold(zero, join)
 }
 
 /// a . b over the points of a.

@@ -18,7 +18,7 @@ use super::sides::Beyond;
 use crate::geometry::{Collider, Shape, Vector};
 use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
-use crate::math::parallel::Tasks;
+use crate::math::parallel::{self, Tasks};
 use crate::operators::Spot;
 use crate::state::{Field, Grid, Place, Vectors};
 use std::sync::Arc;
@@ -248,7 +248,7 @@ impl Solids {
         self.measure(t);
         self.weigh();
         let n = self.grid.n;
-        let planes: Vec<Found> = (0..=n[2]).map_in_parallel(|k| self.search(k, t));
+        let planes: Vec<Found> = parallel::map(n[2] + 1, |k| self.search(k, t));
         let Self { cuts, closed, ghosts, dead, shades, .. } = self;
         cuts.clear();
         ghosts.clear();

@@ -1,7 +1,7 @@
 //! The direct sum: every mass pulls every other, every charge pushes every other.
 
 use crate::elements::{Batch, Block, Weights};
-use crate::math::parallel::{Tasks, chunks};
+use crate::math::parallel::{self, Tasks, chunks};
 use crate::math::roots::{cube_unit, first_guess, inverse_cube, inverse_root, root_unit};
 use crate::math::simd::{Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz64};
@@ -699,7 +699,7 @@ const TASK: usize = 128;
 
 /// `f(range)` of fixed shares of 0..n, in order.
 fn tasks(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> Vec<f64> {
-    (0..n.div_ceil(TASK)).map_in_parallel(|k| f(k * TASK..((k + 1) * TASK).min(n)))
+    parallel::map(n.div_ceil(TASK), |k| f(k * TASK..((k + 1) * TASK).min(n)))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::Vector;
 use super::bvh::{Feature, Node, build, closest_on_triangle, high, low};
 use super::motion::Pose;
 use crate::math::functions::{acos, floor};
-use crate::math::parallel::Tasks;
+use crate::math::parallel::{self, Tasks};
 use crate::math::rotation::from_axes;
 use tumble_interface::Mesh;
 
@@ -115,7 +115,7 @@ impl Facets {
             }
         }
         let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times, frames, apart: Vec::new(), back };
-        let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).map_in_parallel(|k| facets.refit(k));
+        let pairs = parallel::map(facets.frames.len().saturating_sub(1).max(1), |k| facets.refit(k));
         facets.boxes = pairs;
         let apart = facets.boxes.iter().map_in_parallel(|boxes| Apart::new(&facets.nodes, boxes));
         facets.apart = apart;

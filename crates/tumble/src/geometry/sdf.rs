@@ -2,7 +2,7 @@
 //! those that a shell or a thin part runs through, are marked.
 
 use super::{Bvh, Vector};
-use crate::math::parallel::Tasks;
+use crate::math::parallel;
 use tumble_interface::Mesh;
 
 /// Nodes along the side of a tile.
@@ -50,7 +50,7 @@ impl GridSdf {
             nodes.map(|p| if far { (middle - (p - center).norm()) as f32 } else { distance(p) as f32 }).collect()
         };
         let count = tiles[0] * tiles[1] * tiles[2];
-        let blocks: Vec<Vec<f32>> = (0..count).map_in_parallel(tile);
+        let blocks: Vec<Vec<f32>> = parallel::map(count, tile);
         let mut values = vec![0.0; n[0] * n[1] * n[2]];
         for (t, block) in blocks.iter().enumerate() {
             let [a, b, c] = [t % tiles[0], t / tiles[0] % tiles[1], t / (tiles[0] * tiles[1])].map(|i| i * TILE);
@@ -90,7 +90,7 @@ impl GridSdf {
             };
             (0..64).fold(0, |bits, b| bits | u64::from(64 * w + b < self.values.len() && is_rough(64 * w + b)) << b)
         };
-        (0..self.values.len().div_ceil(64)).map_in_parallel(word)
+        parallel::map(self.values.len().div_ceil(64), word)
     }
 
     /// Signed distance [m] and its gradient at p, `None` where the grid is too coarse for the surface; outside the grid a lower bound of

@@ -19,30 +19,69 @@ pub fn each(n: usize, f: &(dyn Fn(usize) + Sync)) {
     }
 }
 
-/// Tasks that threads may take. Like `take`, it does not depend on what is done with them, so that it is compiled once for all that is.
-fn list<I: Iterator>(tasks: I) -> Vec<Mutex<Option<I::Item>>> {
-    tasks.map(|task| Mutex::new(Some(task))).collect()
+/// What threads give to one another, each once. The functions of slots do not depend on what is done with their contents, so that they
+/// are compiled once for all that is.
+type Slot<T> = Mutex<Option<T>>;
+
+fn filled<I: Iterator>(tasks: I) -> Vec<Slot<I::Item>> {
+    let mut slots = Vec::new();
+    for task in tasks {
+        slots.push(Mutex::new(Some(task)));
+    }
+    slots
 }
 
-fn take<T>(task: &Mutex<Option<T>>) -> Option<T> {
-    task.lock().unwrap_or_else(PoisonError::into_inner).take()
+fn empty<T>(n: usize) -> Vec<Slot<T>> {
+    let mut slots = Vec::new();
+    slots.resize_with(n, || Mutex::new(None));
+    slots
+}
+
+fn take<T>(slot: &Slot<T>) -> Option<T> {
+    slot.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
+
+fn put<T>(slot: &Slot<T>, content: T) {
+    *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(content);
+}
+
+fn contents<T>(slots: Vec<Slot<T>>) -> Vec<T> {
+    let mut all = Vec::with_capacity(slots.len());
+    for slot in slots {
+        all.extend(slot.into_inner().unwrap_or_else(PoisonError::into_inner));
+    }
+    all
+}
+
+/// `f(0)`, ..., `f(n - 1)`, in order.
+pub fn map<R: Send>(n: usize, f: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let results = empty(n);
+    each(n, &|i| put(&results[i], f(i)));
+    contents(results)
 }
 
 /// Tasks for all threads, coarse ones: each costs an entry of a list and a lock.
 pub trait Tasks: Iterator<Item: Send> + Sized {
     /// Calls `f` for each.
     fn in_parallel(self, f: impl Fn(Self::Item) + Sync) {
-        let tasks = list(self);
-        each(tasks.len(), &|i| take(&tasks[i]).into_iter().for_each(&f));
+        let tasks = filled(self);
+        each(tasks.len(), &|i| {
+            if let Some(task) = take(&tasks[i]) {
+                f(task);
+            }
+        });
     }
 
     /// Results of `f` for each, in order.
     fn map_in_parallel<R: Send>(self, f: impl Fn(Self::Item) -> R + Sync) -> Vec<R> {
-        let mut results: Vec<Option<R>> = Vec::new();
-        let tasks: Vec<_> = self.collect();
-        results.resize_with(tasks.len(), || None);
-        tasks.into_iter().zip(&mut results).in_parallel(|(task, result)| *result = Some(f(task)));
-        results.into_iter().flatten().collect()
+        let tasks = filled(self);
+        let results = empty(tasks.len());
+        each(tasks.len(), &|i| {
+            if let Some(task) = take(&tasks[i]) {
+                put(&results[i], f(task));
+            }
+        });
+        contents(results)
     }
 }
 
@@ -99,7 +138,7 @@ pub fn worst(n: usize, f: impl Fn(usize) -> f64 + Sync) -> Option<(usize, f64)> 
 /// `f(range)` of every chunk of 0..n, in order.
 pub fn fold<T: Send>(n: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let range = |i: usize| i * CHUNK..((i + 1) * CHUNK).min(n);
-    (0..n.div_ceil(CHUNK)).map_in_parallel(|i| f(range(i)))
+    map(n.div_ceil(CHUNK), |i| f(range(i)))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 //! loses all that it has, for which the step is cut. Source: [easter1993], [roe1986]; tests: crates/tumble-f64/tests/transport.rs.
 
 use super::stencil::{each_row, fetch, ghosted, reach};
-use crate::math::parallel::{Tasks, sum};
+use crate::math::parallel::{self, sum};
 use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Real, Spare};
 use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
@@ -129,7 +129,7 @@ fn outflow(u: &Vectors, grid: &Grid, h: f64) -> f64 {
         }
         most
     };
-    h / grid.dx * (0..z).map_in_parallel(plane).into_iter().fold(0.0, f64::max)
+    h / grid.dx * parallel::map(z, plane).into_iter().fold(0.0, f64::max)
 }
 
 /// Fields at cells carried by the flow u for h seconds, in flux form; u times the open share of each face where solids are. Returns what

@@ -12,7 +12,8 @@ fn all_elements_come_once_and_none_side_by_side_share_a_node() {
         .chain((1000..1100).map(|i| [7, i]))
         .map(|nodes| Members { nodes, rest: [1.0], law: [], stiffness: 1.0, damping: 0.0 })
         .collect();
-    let (given, order) = sorted(n as usize, &members, &[]);
+    let all: Vec<u32> = members.iter().flat_map(|m| m.nodes).collect();
+    let (given, order) = sorted(n as usize, 2, &all, &[]);
     let mut sum = given.clone();
     sum.sort_unstable();
     assert!(sum.into_iter().eq(0..members.len() as u32));
@@ -48,7 +49,8 @@ fn links_inside_and_between_clusters_are_all_satisfied_in_their_order() {
     let across = (0..n - 64).map(|i| link([i, i + 64], if i % 2 == 0 { 0.3 } else { 0.05 }));
     let members: Vec<_> = (0..n - 1).map(|i| link([i, i + 1], 0.7)).chain(across).collect();
     let start: Vec<Row> = (0..n).map(|i| [(i % 64) as Real * 0.8, 0.6 * (i % 2) as Real, 0.1 * (i / 64) as Real, 1.0]).collect();
-    let (given, _) = sorted(n as usize, &members, &[]);
+    let all: Vec<u32> = members.iter().flat_map(|m| m.nodes).collect();
+    let (given, _) = sorted(n as usize, 2, &all, &[]);
     let columns = Columns::new(n as usize, n as usize, &[], &members, &[]).unwrap();
     let [first, second] = &columns.nodes;
     let along = |e: usize, l: usize| [first, second].iter().all(|i| i.get()[e + l] == i.get()[e] + l as u32);

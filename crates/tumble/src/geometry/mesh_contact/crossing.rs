@@ -10,7 +10,7 @@
 use super::topology::Topology;
 use super::tree::{LEAF, Tree, around, whole};
 use crate::geometry::Vector;
-use crate::math::parallel::Tasks;
+use crate::math::parallel;
 use crate::math::{Row, xyz64};
 use robust::{Coord3D, orient3d};
 
@@ -97,7 +97,7 @@ fn visit<T: Default + Send>(
         }
         found
     };
-    (0..edges.n_leaves().div_ceil(TASK)).map_in_parallel(task)
+    parallel::map(edges.n_leaves().div_ceil(TASK), task)
 }
 
 /// A flag for each vertex of an edge or a triangle that takes part in a crossing, and of their neighbours so many edges away.

@@ -17,7 +17,7 @@ use super::distance::{Nearest, edge_edge, point_triangle};
 use super::topology::Topology;
 use super::tree::{Box3, LEAF, Tree, around, grown, union, whole};
 use crate::geometry::Vector;
-use crate::math::parallel::{Tasks, chunks};
+use crate::math::parallel::{self, Tasks, chunks};
 use crate::math::{Real, Row, xyz64};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -697,7 +697,7 @@ fn search<const ITSELF: bool>(from: &Tree, with: &Tree, reach: f64, f: impl Fn(u
         }
         found
     };
-    (0..from.n_leaves().div_ceil(TASK)).map_in_parallel(task)
+    parallel::map(from.n_leaves().div_ceil(TASK), task)
 }
 
 /// Appends pairs, sorted by their vertices, of which there are n.

@@ -175,8 +175,19 @@ pub fn largest<W: Width>(w: W, lanes: W::L, most: Real) -> Real {
     each[..W::N].iter().fold(most, |most, lane| most.max(*lane))
 }
 
-/// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one.
+/// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one: in the same body, or, where that is long, by
+/// the kernel of all numbers from `$e` on, whose code for single numbers is then compiled once, not in that for each width.
 macro_rules! packs {
+    ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr, else $kernel:expr) => {{
+        let mut $e = $range.start;
+        while $e + $width::N <= $range.end {
+            $body;
+            $e += $width::N;
+        }
+        if $e < $range.end {
+            $crate::math::simd::one_by_one($kernel);
+        }
+    }};
     ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
         let mut $e = $range.start;
         while $e + $width::N <= $range.end {
@@ -455,7 +466,7 @@ operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f
 pub enum Level {
     /// One number at a time.
     Scalar,
-    /// SSE4.2, or those of WebAssembly: 128-bit registers.
+    /// Those of WebAssembly: 128-bit registers.
     Narrow,
     /// AVX2: 256-bit registers.
     Avx2,
@@ -467,7 +478,7 @@ impl Level {
     /// The levels that this machine has.
     pub fn available() -> Vec<Level> {
         #[cfg(target_arch = "x86_64")]
-        let wide = [(Self::Narrow, x86::sse().is_some()), (Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
+        let wide = [(Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
         #[cfg(not(target_arch = "x86_64"))]
         let wide = [(Self::Narrow, cfg!(all(target_arch = "wasm32", target_feature = "simd128")))];
         std::iter::once(Self::Scalar).chain(wide.into_iter().filter(|(_, has)| *has).map(|(level, _)| level)).collect()
@@ -500,6 +511,12 @@ pub fn widest() -> Level {
     Level::available().into_iter().rfind(|level| *level as u8 <= most).unwrap_or(Level::Scalar)
 }
 
+/// Runs a kernel on one number at a time.
+#[inline(never)]
+pub fn one_by_one<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run(Scalar)
+}
+
 /// Runs a kernel on the widest registers of this machine.
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
@@ -529,9 +546,6 @@ pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
         if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::avx2()) {
             return Simd::vectorize(simd, x86::InAvx2 { kernel, simd });
         }
-        if !QUICK && let (Level::Narrow | Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::sse()) {
-            return Simd::vectorize(simd, x86::InSse { kernel, simd });
-        }
     }
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     if level != Level::Scalar {
@@ -539,7 +553,7 @@ pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
         return kernel.run(unsafe { pulp::wasm::Simd128::new_unchecked() });
     }
     let _ = level;
-    kernel.run(Scalar)
+    one_by_one(kernel)
 }
 
 #[cfg(test)]

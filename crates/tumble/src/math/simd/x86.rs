@@ -1,14 +1,9 @@
-//! The registers of SSE4.2, AVX2 and AVX-512.
+//! The registers of AVX2 and AVX-512.
 
 use super::registers::{Transpose, four_packs, width};
 use super::{GUESS, Kernel, Mask, Pack, Real, Registers, Row, Width};
-use pulp::x86::{V2, V3, V4};
+use pulp::x86::{V3, V4};
 use pulp::{Simd, WithSimd, cast};
-
-pub fn sse() -> Option<V2> {
-    static TOKEN: std::sync::OnceLock<Option<V2>> = std::sync::OnceLock::new();
-    *TOKEN.get_or_init(V2::try_new)
-}
 
 pub fn avx2() -> Option<V3> {
     static TOKEN: std::sync::OnceLock<Option<V3>> = std::sync::OnceLock::new();
@@ -36,22 +31,8 @@ macro_rules! entry {
         }
     };
 }
-entry!(InSse, V2);
 entry!(InAvx2, V3);
 entry!(InAvx512, V4);
-
-impl Registers for V2 {
-    #[inline(always)]
-    fn any(self, mask: Mask<Self>) -> bool {
-        self.sse._mm_movemask_ps(cast(mask)) != 0
-    }
-    #[cfg(not(feature = "double"))]
-    #[inline(always)]
-    fn half_bits(self, from: u32, x: Self::f32s) -> Self::f32s {
-        let half = self.sse2._mm_srli_epi32::<1>(cast(x));
-        cast(self.sse2._mm_sub_epi32(cast(self.splat_u32s(from)), half))
-    }
-}
 
 impl Registers for V3 {
     #[inline(always)]
@@ -70,7 +51,7 @@ impl Registers for V4 {
 #[cfg(not(feature = "double"))]
 mod single {
     use super::*;
-    use std::arch::x86_64::{__m128, __m256, __m512};
+    use std::arch::x86_64::{__m256, __m512};
 
     /// GUESS - bits/2.
     #[inline(always)]
@@ -89,13 +70,6 @@ mod single {
         s.mul_add_f32s(a, b, c)
     }
 
-    /// a b + c where no instruction rounds once.
-    #[inline(always)]
-    fn apart(s: V2, a: <V2 as Simd>::f32s, b: <V2 as Simd>::f32s, c: <V2 as Simd>::f32s) -> <V2 as Simd>::f32s {
-        s.add_f32s(s.mul_f32s(a, b), c)
-    }
-
-    width!(V2, 4, splat_f32s, apart, guess, false, guess, |s: V2, x| s.sse4_1._mm_floor_ps(x), |s: V2, x| s.sse2._mm_cvttps_epi32(x));
     width!(V3, 8, splat_f32s, fused, guess, false, guess, |s: V3, x| s.avx._mm256_floor_ps(x), |s: V3, x| s.avx._mm256_cvttps_epi32(x));
     width!(V4, 16, splat_f32s, fused, guess, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_ps::<1>(x), |s: V4, x| s
         .avx512f
@@ -108,49 +82,6 @@ mod single {
             let (ef, gh) = ($s.$hi($a, $b), $s.$hi($c, $d));
             [$s.$shuffle::<0x44>(ab, cd), $s.$shuffle::<0xEE>(ab, cd), $s.$shuffle::<0x44>(ef, gh), $s.$shuffle::<0xEE>(ef, gh)]
         }};
-    }
-
-    impl Transpose for V2 {
-        type Rows = [Row; 4];
-        type Index = [i32; 4];
-        #[inline(always)]
-        unsafe fn pairs_at(self, from: *const f32, index: [i32; 4]) -> [Pack<Self>; 2] {
-            let from = from.cast::<f64>();
-            let mut p = [0.0_f64; 4];
-            for l in 0..4 {
-                // SAFETY: the caller has checked the indices.
-                p[l] = unsafe { from.byte_add(4 * index[l] as usize).read_unaligned() };
-            }
-            let (s, [low, high]): (_, [__m128; 2]) = (self.sse, cast(p));
-            let pack = |v: __m128| Pack { simd: self, v: cast(v) };
-            [pack(s._mm_shuffle_ps::<0x88>(low, high)), pack(s._mm_shuffle_ps::<0xDD>(low, high))]
-        }
-        type OfRows = [f32; 1];
-        #[inline(always)]
-        fn each_four_times(self, [a]: [f32; 1]) -> Pack<Self> {
-            Pack { simd: self, v: self.splat_f32s(a) }
-        }
-        #[inline(always)]
-        fn transpose(self, r: [Row; 4]) -> [Pack<Self>; 4] {
-            let s = self.sse;
-            let [a, b, c, d] = [cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3])];
-            let [x, y, z, w] = four_by_four!(s, _mm_unpacklo_ps, _mm_unpackhi_ps, _mm_shuffle_ps, [a, b, c, d]);
-            four_packs!(self, [x, y, z, w])
-        }
-        #[inline(always)]
-        fn untranspose(self, v: [Pack<Self>; 4]) -> [Row; 4] {
-            let rows = self.untranspose_run(v);
-            [cast(rows[0].v), cast(rows[1].v), cast(rows[2].v), cast(rows[3].v)]
-        }
-        #[inline(always)]
-        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
-            self.transpose([cast(run[0].v), cast(run[1].v), cast(run[2].v), cast(run[3].v)])
-        }
-        #[inline(always)]
-        fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
-            // A row is a register: there and back is the same.
-            self.transpose_run(v)
-        }
     }
 
     impl Transpose for V3 {
@@ -334,43 +265,16 @@ mod double {
         cast(s.avx512f._mm512_rsqrt14_pd(cast(x)))
     }
 
-    /// GUESS - bits/2.
-    #[inline(always)]
-    fn guess2(s: V2, x: <V2 as Simd>::f64s) -> <V2 as Simd>::f64s {
-        let half = s.sse2._mm_srli_epi64::<1>(cast(x));
-        cast(s.sse2._mm_sub_epi64(cast(s.splat_u64s(GUESS)), half))
-    }
-
     /// a b + c, rounded once.
     #[inline(always)]
     fn fused<S: Simd>(s: S, a: S::f64s, b: S::f64s, c: S::f64s) -> S::f64s {
         s.mul_add_f64s(a, b, c)
     }
 
-    /// a b + c where no instruction rounds once.
-    #[inline(always)]
-    fn apart(s: V2, a: <V2 as Simd>::f64s, b: <V2 as Simd>::f64s, c: <V2 as Simd>::f64s) -> <V2 as Simd>::f64s {
-        s.add_f64s(s.mul_f64s(a, b), c)
-    }
-
-    /// Two whole numbers; the upper half of the register holds zeros.
-    #[inline(always)]
-    fn whole2(s: V2, x: __m128d) -> [i32; 2] {
-        let [a, b, _, _]: [i32; 4] = cast(s.sse2._mm_cvttpd_epi32(x));
-        [a, b]
-    }
-
-    width!(V2, 2, splat_f64s, apart, guess2, false, guess2, |s: V2, x| s.sse4_1._mm_floor_pd(x), whole2);
     width!(V3, 4, splat_f64s, fused, guess3, false, guess3, |s: V3, x| s.avx._mm256_floor_pd(x), |s: V3, x| s.avx._mm256_cvttpd_epi32(x));
     width!(V4, 8, splat_f64s, fused, guess4, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_pd::<1>(x), |s: V4, x| s
         .avx512f
         ._mm512_cvttpd_epi32(x));
-
-    /// Transposes two by two; its own inverse.
-    #[inline(always)]
-    fn two_by_two(s: V2, a: __m128d, b: __m128d) -> [__m128d; 2] {
-        [s.sse2._mm_unpacklo_pd(a, b), s.sse2._mm_unpackhi_pd(a, b)]
-    }
 
     /// Transposes four by four; its own inverse.
     #[inline(always)]
@@ -383,46 +287,6 @@ mod double {
             s._mm256_permute2f128_pd::<0x31>(ab, cd),
             s._mm256_permute2f128_pd::<0x31>(ef, gh),
         ]
-    }
-
-    impl Transpose for V2 {
-        type Rows = [Row; 2];
-        type Index = [i32; 2];
-        #[inline(always)]
-        unsafe fn pairs_at(self, from: *const f64, i: [i32; 2]) -> [Pack<Self>; 2] {
-            let mut p = [[0.0; 2]; 2];
-            for l in 0..2 {
-                // SAFETY: the caller has checked the indices.
-                p[l] = unsafe { *from.add(i[l] as usize).cast::<[f64; 2]>() };
-            }
-            let [low, high] = two_by_two(self, cast(p[0]), cast(p[1]));
-            [Pack { simd: self, v: cast(low) }, Pack { simd: self, v: cast(high) }]
-        }
-        type OfRows = [f64; 1];
-        #[inline(always)]
-        fn each_four_times(self, [a]: [f64; 1]) -> Pack<Self> {
-            Pack { simd: self, v: self.splat_f64s(a) }
-        }
-        #[inline(always)]
-        fn transpose(self, r: [Row; 2]) -> [Pack<Self>; 4] {
-            let [a, b, c, d]: [__m128d; 4] = cast(r);
-            let ([x, y], [z, w]) = (two_by_two(self, a, c), two_by_two(self, b, d));
-            four_packs!(self, [x, y, z, w])
-        }
-        #[inline(always)]
-        fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 2] {
-            let ([a, c], [b, d]) = (two_by_two(self, cast(x.v), cast(y.v)), two_by_two(self, cast(z.v), cast(w.v)));
-            cast([a, b, c, d])
-        }
-        #[inline(always)]
-        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
-            self.transpose(cast([run[0].v, run[1].v, run[2].v, run[3].v]))
-        }
-        #[inline(always)]
-        fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
-            let [a, b, c, d]: [__m128d; 4] = cast(self.untranspose(v));
-            four_packs!(self, [a, b, c, d])
-        }
     }
 
     impl Transpose for V3 {

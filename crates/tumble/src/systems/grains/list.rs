@@ -6,7 +6,7 @@
 
 use super::law::Memory;
 use crate::geometry::{Neighbours, Vector};
-use crate::math::parallel::Tasks;
+use crate::math::parallel;
 use crate::math::{Real, Row};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -192,7 +192,7 @@ impl List {
             part.first.push(part.own.rows.len() as u32);
             part
         };
-        self.parts = (0..x.len().div_ceil(chunk)).map_in_parallel(part);
+        self.parts = parallel::map(x.len().div_ceil(chunk), part);
         self.found = found;
     }
 

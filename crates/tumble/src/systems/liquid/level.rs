@@ -11,7 +11,7 @@
 use super::particles::Particles;
 use crate::fluids::Solids;
 use crate::math::Real;
-use crate::math::parallel::Tasks;
+use crate::math::parallel::{self, Tasks};
 use crate::state::{Field, Grid, GridError, Place};
 use std::f64::consts::PI;
 
@@ -128,7 +128,7 @@ impl Level {
             let low = at - first;
             up.iter().any(|z| along.iter().any(|y| across.iter().any(|x| phi[low + x + y + z] < -DEEP)))
         };
-        let planes = (0..z).map_in_parallel(|k| {
+        let planes = parallel::map(z, |k| {
             let mut volume = 0.0;
             for j in 0..y {
                 let row = lattice.at(0, j, k);
