@@ -70,6 +70,10 @@ class Ledger(TypedDict):
     """People who have left by exits so far."""
     stranded: int | None
     """People on the floor from whom no way leads to where they go."""
+    fallen: int | None
+    """People on the floor whom bodies have knocked down, and who will rise."""
+    injured: int | None
+    """People on the floor whom bodies have injured so far."""
     lost: float | None
     """Time that people have lost so far against walking freely, all together [s]."""
     divergence: float | None

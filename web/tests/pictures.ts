@@ -43,6 +43,7 @@ const AT: Record<string, number> = {
   "grains/hopper": 30,
   "grains/hourglass": 30,
   "crowd/bottleneck": 200,
+  "crowd/ceiling": 72,
   "crowd/office": 240,
   "integrators/overshoot": 5,
   "liquid/dam": 16,

@@ -40,6 +40,7 @@ mod pressure;
 mod projections;
 mod reflection;
 mod rimea;
+mod rocks;
 mod shape_contact;
 mod sheets;
 mod single_steps;

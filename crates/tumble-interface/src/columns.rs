@@ -117,6 +117,7 @@ pub const COLUMNS: &[Described] = &[
     Described { name: "id", doc: "Number of an emitted particle, which it keeps.", ..ALWAYS },
     Described { name: "age", unit: "s", doc: "Time since its birth.", ..ALWAYS },
     Described { name: "color", doc: "Red, green and blue.", width: 3, ..ALWAYS },
+    Described { name: "fallen", doc: "Of people: 0 on their feet, 1 knocked down, 2 injured.", ..ALWAYS },
     Described { name: "crossings", doc: "Who has crossed a gate so far: from its left to its right, and back.", width: 2, ..GATES },
     Described { name: "crossing_times", unit: "s", doc: "When a gate was crossed first and last; nan before.", width: 2, ..GATES },
     Described {

@@ -319,6 +319,10 @@ measures! {
         left: Option<u64> = Measure { columns: &["left"], ..STATE };
         /// People on the floor from whom no way leads to where they go.
         stranded: Option<u64> = Measure { columns: &["stranded"], ..STATE };
+        /// People on the floor whom bodies have knocked down, and who will rise.
+        fallen: Option<u64> = Measure { columns: &["fallen"], ..STATE };
+        /// People on the floor whom bodies have injured so far.
+        injured: Option<u64> = Measure { columns: &["injured"], ..STATE };
         /// Time that people have lost so far against walking freely, all together.
         lost: Option<f64> = Measure { unit: "s", signed: true, columns: &["lost"], ..STATE };
         /// Largest divergence of a gas's velocity in a cell.

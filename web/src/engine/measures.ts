@@ -47,6 +47,10 @@ export interface Ledger {
   left: number | null;
   /** People on the floor from whom no way leads to where they go. */
   stranded: number | null;
+  /** People on the floor whom bodies have knocked down, and who will rise. */
+  fallen: number | null;
+  /** People on the floor whom bodies have injured so far. */
+  injured: number | null;
   /** Time that people have lost so far against walking freely, all together [s]. */
   lost: number | null;
   /** Largest divergence of a gas's velocity in a cell [1/s]. */

@@ -291,7 +291,7 @@ pub struct Walking {
     /// Distance between bodies at which people stand, of the same. Default: 0.04 m.
     #[schemars(range(min = 0.0, max = 2.0), extend("x-unit" = "m"))]
     pub buffer: Option<f64>,
-    /// Mass of a body, of `social_force`. Default: 80 kg.
+    /// Mass of a person, of `social_force`, and in blows by objects of `body`. Default: 80 kg.
     #[schemars(range(min = 10.0, max = 1000.0), extend("x-unit" = "kg"))]
     pub mass: Option<f64>,
     /// Time in which velocities relax to desired ones, of `social_force`. Default: 0.5 s.
@@ -300,6 +300,15 @@ pub struct Walking {
     /// For which time velocities keep clear of others, of `orca`. Default: 2 s.
     #[schemars(range(min = 0.1, max = 10.0), extend("x-unit" = "s"))]
     pub time_horizon: Option<f64>,
+    /// Who gets faster than this by the blow of a `body` falls. Default: 1 m/s.
+    #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
+    pub fall_speed: Option<f64>,
+    /// How long they lie. Default: 5 s.
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub rise_time: Option<f64>,
+    /// Energy of a blow that injures: they never rise. Default: 79 J.
+    #[schemars(extend("x-unit" = "J", "exclusiveMinimum" = 0.0))]
+    pub injury_energy: Option<f64>,
 }
 
 fn one() -> f64 {

@@ -244,7 +244,7 @@ mod single {
 #[cfg(feature = "double")]
 mod double {
     use super::*;
-    use std::arch::x86_64::{__m128d, __m256d, __m512d};
+    use std::arch::x86_64::{__m256d, __m512d};
 
     /// GUESS - bits/2.
     #[inline(always)]

@@ -223,15 +223,15 @@ pub fn resolve(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Whether masses and rigid bodies may touch, in a scene whose systems are written out.
+/// Whether masses, grains or people and rigid bodies may touch, in a scene whose systems are written out.
 pub fn touches(scene: &Scene) -> bool {
     !scene.body.is_empty() && scene.objects().iter().any(|o| visits_bodies(scene, o))
 }
 
-/// Whether an object consists of masses or grains that touch rigid bodies.
+/// Whether an object consists of masses, grains or people that touch rigid bodies.
 pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
-    matches!(mover, Some(Method::Grains | Method::Dynamics))
+    matches!(mover, Some(Method::Grains | Method::Dynamics | Method::Crowd))
 }
 
 /// Lists of objects that fluids move as bodies, and where they stand.

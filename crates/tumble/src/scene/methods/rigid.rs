@@ -94,7 +94,7 @@ impl MethodRules for Rules {
         let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
             let message = format!(
-                "rigid bodies meet each other, colliders, grains, and masses of dynamics systems, and a gas or a liquid where its `bodies` name them, but not what [[{other}]] consists of, nor does that meet them"
+                "rigid bodies meet each other, colliders, grains, people, and masses of dynamics systems, and a gas or a liquid where its `bodies` name them, but not what [[{other}]] consists of, nor does that meet them"
             );
             warnings.push(Warning::new(Code::Unfelt, "body", message));
         }

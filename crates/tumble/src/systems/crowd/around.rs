@@ -1,5 +1,6 @@
 //! People, and what is around one of them: walls, others, and where it can go.
 
+use super::bodies::Touch;
 use super::plan::{Plan, Point, along, cross, dot, length, nearest, sub};
 use crate::math::functions::exp;
 
@@ -26,6 +27,12 @@ pub struct Person {
     pub out: Option<Point>,
     /// Whether it has.
     pub started: bool,
+    /// Velocity by the blows of bodies [m/s].
+    pub slide: Point,
+    /// When it has risen from a fall [s]; never, if it is injured.
+    pub up: f64,
+    /// Whether it lies on the floor.
+    pub lies: bool,
     /// Number, which it keeps.
     pub id: u32,
     /// Its crowd.
@@ -37,6 +44,11 @@ pub struct Person {
 }
 
 impl Person {
+    /// Whether it is on its way at t [s], on its feet.
+    pub fn walks(&self, t: f64) -> bool {
+        self.started && t >= self.up && self.out.is_none()
+    }
+
     /// Whether it is on its way, and slow.
     pub fn waits(&self) -> bool {
         self.started && length(self.v) < WAITS * self.free
@@ -89,6 +101,8 @@ pub struct Around<'a> {
     pub plan: &'a Plan,
     /// Walls near it.
     pub walls: &'a [u32],
+    /// Bodies near it.
+    pub bodies: &'a [Touch],
     pub others: &'a [Neighbour<'a>],
 }
 
@@ -98,7 +112,7 @@ impl Around<'_> {
         self.walls.is_empty() || self.plan.sees(self.walls, self.me.x, along(self.me.x, 1.0, r))
     }
 
-    /// From here to the nearest place of each wall near [m], and its length.
+    /// From here to the nearest place of each wall and body near [m], and its length.
     ///
     /// A gate that closes on somebody is no wall to it.
     pub fn to_walls(&self) -> impl Iterator<Item = (Point, f64)> {
@@ -107,7 +121,8 @@ impl Around<'_> {
             (*w as usize, d, length(d))
         };
         let is_wall = |(w, _, far): &(usize, Point, f64)| *w < self.plan.solid || *far >= self.me.radius;
-        self.walls.iter().map(far).filter(is_wall).map(|(_, d, far)| (d, far))
+        let walls = self.walls.iter().map(far).filter(is_wall).map(|(_, d, far)| (d, far));
+        walls.chain(self.bodies.iter().filter_map(|body| body.wall(self.me.radius)))
     }
 
     /// Desired direction, bent by walls.                                                             (crowds.2)

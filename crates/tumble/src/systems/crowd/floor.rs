@@ -1,7 +1,7 @@
 //! A plan with the ways across it, and which of its gates are open when.
 
-use super::plan::{Gate, Plan};
-use super::way::{Cells, Target, Way};
+use super::plan::{Gate, Plan, Point};
+use super::way::{Cells, Grid, Target, Way};
 
 /// How far from a gate people are near it [m].
 pub const NEAR: f64 = 1.0;
@@ -16,6 +16,8 @@ pub struct Floor {
     open: Plan,
     /// Which gates are closed.
     closed: Vec<bool>,
+    /// Cells in which bodies rest, in order.
+    blocked: Vec<u32>,
     /// What each way leads to.
     targets: Vec<Vec<Target>>,
     ways: Vec<Way>,
@@ -32,7 +34,8 @@ impl Floor {
         let areas = plan.gates.iter().map(|gate| cells.floor(&plan, gate, NEAR)).collect();
         let closed: Vec<bool> = plan.gates.iter().map(|gate| gate.is_closed(0.0)).collect();
         let (ways, gates) = (Vec::new(), Vec::new());
-        let mut floor = Self { plan: plan.clone(), areas, open: plan, closed, targets, ways, gates, sizes: [side, radius] };
+        let blocked = Vec::new();
+        let mut floor = Self { plan: plan.clone(), areas, open: plan, closed, blocked, targets, ways, gates, sizes: [side, radius] };
         if floor.closed.contains(&true) {
             floor.replan();
         } else {
@@ -51,10 +54,51 @@ impl Floor {
         !same
     }
 
+    /// Closes these cells, in order, and opens all others; whether one of them changed.
+    pub fn close(&mut self, cells: Vec<u32>) -> bool {
+        let same = cells == self.blocked;
+        if !same {
+            self.blocked = cells;
+            self.replan();
+        }
+        !same
+    }
+
+    /// Cells that are closed.
+    pub fn blocked(&self) -> &[u32] {
+        &self.blocked
+    }
+
+    /// The largest radius of a body [m].
+    pub fn radius(&self) -> f64 {
+        self.sizes[1]
+    }
+
+    /// Side of a cell [m].
+    pub fn side(&self) -> f64 {
+        self.sizes[0]
+    }
+
+    /// The middle of a cell.
+    pub fn middle(&self, cell: u32) -> Point {
+        Grid::of(&self.open, self.sizes[0]).middle(cell as usize)
+    }
+
+    /// Cells in the square around a place.
+    pub fn cells_around(&self, x: Point, far: f64) -> impl Iterator<Item = u32> {
+        Grid::of(&self.open, self.sizes[0]).around([x, x], far).map(|cell| cell as u32)
+    }
+
+    /// How many cells there are.
+    pub fn cells(&self) -> usize {
+        Grid::of(&self.open, self.sizes[0]).count()
+    }
+
     /// A plan on which the closed gates are walls, and the ways across it.
     fn replan(&mut self) {
         self.plan = self.open.with_closed(&self.closed);
-        let cells = Cells::new(&self.plan, self.sizes[0], self.sizes[1]);
+        let mut cells = Cells::new(&self.plan, self.sizes[0], self.sizes[1]);
+        self.blocked.iter().for_each(|cell| cells.block(*cell as usize));
         self.find_ways(cells);
     }
 

@@ -1,6 +1,7 @@
 //! One step of people, whatever their model: who is near, where each wants to go, and how far it can go before it meets others.
 
 use super::around::{Around, Neighbour, Other, Person};
+use super::bodies::Bodies;
 use super::floor::Floor;
 use super::models::{Model, Motion};
 use super::near::Near;
@@ -42,8 +43,8 @@ pub struct Move {
 }
 
 /// One step of everybody, from t to t + h [s]. Distances left are not updated.
-pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut Scratch, t: f64, h: f64) {
-    people.iter_mut().for_each(|p| p.started = t >= p.starts || p.out.is_some());
+pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies, scratch: &mut Scratch, t: f64, h: f64) {
+    people.iter_mut().for_each(|p| (p.started, p.lies) = (t >= p.starts || p.out.is_some(), t < p.up));
     let most = |f: fn(&Person) -> f64| people.iter().map(f).fold(0.0, f64::max);
     let range = model.reach(most(|p| p.speed), most(|p| p.radius));
     let Scratch { near, sorted, own, moves } = scratch;
@@ -78,7 +79,8 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut S
             let person = &all[me.row as usize];
             let (down, gate) = person.out.map_or(direction, |out| (out, NONE));
             let speed = floor.plan.slope(me.x).map_or(person.speed, |slope| person.speed * slope.factor(down));
-            let around = Around { me: person, e: me.e, speed, plan: &floor.plan, walls: floor.plan.near(me.x), others: &others };
+            let (walls, bodies) = (floor.plan.near(me.x), bodies.of(me.row));
+            let around = Around { me: person, e: me.e, speed, plan: &floor.plan, walls, bodies, others: &others };
             *to = Move { gate, ..one(&around, floor.way(person.way), model, down, h, &mut planes) };
         }
     });
@@ -93,8 +95,12 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, scratch: &mut S
 /// What one person does who wants to go in a direction, if in any.
 fn one(around: &Around<'_>, way: &Way, model: &Model, down: Point, h: f64, planes: &mut Vec<(Point, f64)>) -> Move {
     let (me, plan) = (around.me, around.plan);
-    let (mut u, mut heading) = ([0.0; 2], me.heading);
-    if me.started {
+    // Whoever is pushed goes that way, and whoever stands gets out of bodies.
+    let (mut u, mut heading) = (me.slide.map(|v| v * h), me.heading);
+    if !me.lies {
+        u = around.bodies.iter().fold(u, |u, body| along(u, 1.0, body.out()));
+    }
+    if me.started && !me.lies {
         let motion = if down == [0.0; 2] {
             // Nowhere to go, but in the way of others.
             Motion { v: around.makes_way(), heading }
@@ -102,7 +108,10 @@ fn one(around: &Around<'_>, way: &Way, model: &Model, down: Point, h: f64, plane
             model.motion(around, down, h)
         };
         heading = motion.heading;
-        u = around.feasible(motion.v.map(|v| v * h), model.soft(), planes);
+        u = along(motion.v.map(|v| v * h), 1.0, u);
+    }
+    if u != [0.0; 2] {
+        u = around.feasible(u, model.soft(), planes);
     }
     let to = along(me.x, 1.0, u);
     let phi = me.out.map_or_else(|| way.distance(to), |out| me.phi - dot(u, out));

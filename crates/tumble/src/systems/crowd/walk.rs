@@ -2,6 +2,7 @@
 
 use super::around::Person;
 use super::arrivals::Arrivals;
+use super::bodies::{Bodies, Frailty};
 use super::floor::Floor;
 use super::journey::{Goal, Leg, choose};
 use super::models::Model;
@@ -14,6 +15,8 @@ use crate::math::parallel::max;
 /// How far people go on beyond an exit, in the way of who follows [m], and for how long at most [s].
 const BEYOND: f64 = 1.0;
 const PATIENCE: f64 = 3.0;
+/// How often people look which ways bodies close [s].
+const LOOK: f64 = 1.0;
 
 /// People on a floor.
 pub struct Walk {
@@ -30,6 +33,9 @@ pub struct Walk {
     /// Time lost by all so far [s].
     pub lost: f64,
     pub tally: Tally,
+    /// The bodies of others among people, and what people withstand, where there are any.
+    pub bodies: Bodies,
+    frailty: Option<Frailty>,
     scratch: Scratch,
     /// Places and distances left before a step.
     before: Vec<(Point, f64)>,
@@ -37,16 +43,27 @@ pub struct Walk {
 
 impl Walk {
     /// People on a floor.
-    pub fn new(floor: Floor, model: Model, journeys: Vec<Vec<Leg>>, people: Vec<Person>, arrivals: Vec<Arrivals>) -> Self {
+    pub fn new(
+        floor: Floor,
+        (model, frailty): (Model, Option<Frailty>),
+        journeys: Vec<Vec<Leg>>,
+        people: Vec<Person>,
+        arrivals: Vec<Arrivals>,
+    ) -> Self {
         let tally = Tally::new(floor.plan.gates.len());
-        let (scratch, before) = (Scratch::default(), Vec::new());
-        Self { floor, model, journeys, arrivals, people, time: 0.0, lost: 0.0, tally, scratch, before }
+        let (bodies, scratch, before) = (Bodies::default(), Scratch::default(), Vec::new());
+        Self { floor, model, journeys, arrivals, people, time: 0.0, lost: 0.0, tally, bodies, frailty, scratch, before }
     }
 
     /// A step of h [s] from t.
     pub fn step(&mut self, t: f64, h: f64) {
         self.time = t;
-        if self.floor.keep_hours(t) {
+        let looks = (t / LOOK).floor() > ((t - h) / LOOK).floor();
+        let changed = match &self.frailty {
+            Some(frailty) if looks => self.floor.close(self.bodies.closes(&self.floor, frailty)),
+            _ => false,
+        };
+        if self.floor.keep_hours(t) || changed {
             self.replan();
         }
         for arrivals in &mut self.arrivals {
@@ -55,7 +72,11 @@ impl Walk {
         let mut shares = choose(&mut self.people, &self.floor, &self.journeys, t, h);
         self.before.clear();
         self.before.extend(self.people.iter().map(|p| (p.x, p.phi)));
-        step(&mut self.people, &self.floor, &self.model, &mut self.scratch, t, h);
+        if let Some(frailty) = &self.frailty {
+            self.bodies.meet(&mut self.people, frailty, t, h);
+        }
+        step(&mut self.people, &self.floor, &self.model, &self.bodies, &mut self.scratch, t, h);
+        self.bodies.advance(h);
         let moves = std::mem::take(&mut self.scratch.moves);
         let queues = self.tally.queues(&self.floor, &self.people, &moves, h);
         let mut gone = Vec::new();
@@ -128,6 +149,13 @@ impl Walk {
     /// Who has not left.
     pub fn present(&self) -> impl Iterator<Item = &Person> {
         self.people.iter().filter(|p| p.out.is_none())
+    }
+
+    /// How many lie on the floor and will rise, and how many are injured, where there are bodies.
+    pub fn fallen(&self) -> Option<[usize; 2]> {
+        self.frailty?;
+        let lie = |injured: bool| self.present().filter(|p| p.lies && (p.up == f64::INFINITY) == injured).count();
+        Some([lie(false), lie(true)])
     }
 
     /// How many are still to come.

@@ -26,12 +26,47 @@ const ROUNDS: usize = 1000;
 /// How much farther a metre is where bodies do not fit.
 const BAND: f64 = 3.0;
 
-/// Cells over a plan, and what is between them.
-pub struct Cells {
+/// Square cells over a plan.
+#[derive(Debug, Clone, Copy)]
+pub struct Grid {
     origin: Point,
     /// Side of a cell [m].
-    pub side: f64,
+    side: f64,
     n: [usize; 2],
+}
+
+impl Grid {
+    /// Cells of this side [m].
+    pub fn of(plan: &Plan, side: f64) -> Self {
+        let n = [0, 1].map(|a| ((plan.high[a] - plan.low[a] + 2.0 * MARGIN) / side).ceil() as usize + 1);
+        Self { origin: [plan.low[0] - MARGIN, plan.low[1] - MARGIN], side, n }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.n[0] * self.n[1]
+    }
+
+    /// The middle of a cell.
+    pub fn middle(&self, i: usize) -> Point {
+        along(self.origin, self.side, [(i % self.n[0]) as f64 + 0.5, (i / self.n[0]) as f64 + 0.5])
+    }
+
+    /// Cells in the box around a line, and so far around.
+    pub fn around(self, line: Line, far: f64) -> impl Iterator<Item = usize> {
+        let range = |a: usize| {
+            let (low, high) = (line[0][a].min(line[1][a]) - far, line[0][a].max(line[1][a]) + far);
+            let at = |x: f64| ((x - self.origin[a]) / self.side).floor().clamp(0.0, (self.n[a] - 1) as f64) as usize;
+            at(low - self.side)..=at(high + self.side)
+        };
+        let (xs, ys) = (range(0), range(1));
+        ys.flat_map(move |y| xs.clone().map(move |x| x + y * self.n[0]))
+    }
+}
+
+/// Cells over a plan, and what is between them.
+pub struct Cells {
+    grid: Grid,
     /// Whether the middle of a body may be there.
     open: Vec<bool>,
     /// What the link to the next cell along x and along y crosses: a gate, a wall, or `NONE`.
@@ -43,12 +78,11 @@ pub struct Cells {
 impl Cells {
     /// Cells of this side [m], for bodies of this radius [m].
     pub fn new(plan: &Plan, side: f64, radius: f64) -> Self {
-        let origin = [plan.low[0] - MARGIN, plan.low[1] - MARGIN];
-        let n = [0, 1].map(|a| ((plan.high[a] - plan.low[a] + 2.0 * MARGIN) / side).ceil() as usize + 1);
-        let all = n[0] * n[1];
-        let mut cells = Self { origin, side, n, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new() };
+        let grid = Grid::of(plan, side);
+        let all = grid.count();
+        let mut cells = Self { grid, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new() };
         if !plan.slopes.is_empty() {
-            cells.slopes = (0..all).map(|i| plan.slope(cells.middle(i)).copied()).collect();
+            cells.slopes = (0..all).map(|i| plan.slope(grid.middle(i)).copied()).collect();
         }
         for (g, gate) in plan.gates.iter().enumerate() {
             cells.cut(gate.line, g as u32);
@@ -64,32 +98,21 @@ impl Cells {
         cells
     }
 
-    /// The middle of a cell.
-    pub fn middle(&self, i: usize) -> Point {
-        along(self.origin, self.side, [(i % self.n[0]) as f64 + 0.5, (i / self.n[0]) as f64 + 0.5])
+    /// Closes a cell.
+    pub fn block(&mut self, cell: usize) {
+        self.open[cell] = false;
     }
 
     /// Calls `f` for each cell in the box around a line, and so far around.
     fn around(&mut self, line: Line, far: f64, mut f: impl FnMut(&mut Self, usize, Point)) {
-        let range = |a: usize| {
-            let (low, high) = (line[0][a].min(line[1][a]) - far, line[0][a].max(line[1][a]) + far);
-            let at = |x: f64| ((x - self.origin[a]) / self.side).floor().clamp(0.0, (self.n[a] - 1) as f64) as usize;
-            at(low - self.side)..=at(high + self.side)
-        };
-        let (xs, ys) = (range(0), range(1));
-        for y in ys {
-            for x in xs.clone() {
-                let i = x + y * self.n[0];
-                let middle = self.middle(i);
-                f(self, i, middle);
-            }
-        }
+        let grid = self.grid;
+        grid.around(line, far).for_each(|i| f(self, i, grid.middle(i)));
     }
 
     /// Marks the links that a line crosses.
     fn cut(&mut self, line: Line, mark: u32) {
         self.around(line, 0.0, |cells, i, x| {
-            for (a, step) in [[cells.side, 0.0], [0.0, cells.side]].into_iter().enumerate() {
+            for (a, step) in [[cells.grid.side, 0.0], [0.0, cells.grid.side]].into_iter().enumerate() {
                 if meets(line, x, [x[0] + step[0], x[1] + step[1]]) {
                     cells.links[a][i] = mark;
                 }
@@ -99,10 +122,10 @@ impl Cells {
 
     /// The neighbour of a cell along an axis, ahead or behind, and what is between them; none beyond a wall.
     fn neighbour(&self, i: usize, a: usize, ahead: bool) -> Option<(usize, u32)> {
-        let at = if a == 0 { i % self.n[0] } else { i / self.n[0] };
-        let stride = if a == 0 { 1 } else { self.n[0] };
+        let at = if a == 0 { i % self.grid.n[0] } else { i / self.grid.n[0] };
+        let stride = if a == 0 { 1 } else { self.grid.n[0] };
         let (j, link) = match ahead {
-            true if at + 1 < self.n[a] => (i + stride, self.links[a][i]),
+            true if at + 1 < self.grid.n[a] => (i + stride, self.links[a][i]),
             false if at > 0 => (i - stride, self.links[a][i - stride]),
             _ => return None,
         };
@@ -119,7 +142,7 @@ impl Cells {
         let mut areas = [0.0; 2];
         self.around(gate.line, far, |cells, _, x| {
             if let Some(side) = in_sight(plan, gate, x, far) {
-                areas[side] += cells.side * cells.side;
+                areas[side] += cells.grid.side * cells.grid.side;
             }
         });
         areas
@@ -172,21 +195,26 @@ impl Way {
     /// The way to the nearest of these targets, for bodies of this radius [m].
     pub fn new(plan: &Plan, cells: &mut Cells, targets: &[Target], radius: f64) -> Self {
         let all = cells.open.len();
-        let mut way =
-            Solution { side: cells.side, n: cells.n, phi: vec![f64::INFINITY; all], next: vec![NONE; all], exact: vec![false; all] };
+        let mut way = Solution {
+            side: cells.grid.side,
+            n: cells.grid.n,
+            phi: vec![f64::INFINITY; all],
+            next: vec![NONE; all],
+            exact: vec![false; all],
+        };
         for target in targets {
             way.begin(plan, cells, *target, radius);
         }
         way.sweep(cells);
         way.widen(cells, radius);
         way.name_gates(cells);
-        let tiles = cells.n.map(|n| n.div_ceil(TILE));
+        let tiles = cells.grid.n.map(|n| n.div_ceil(TILE));
         let mut sites = vec![Site { phi: f64::INFINITY, down: [0.0; 2], next: NONE }; tiles[0] * tiles[1] * TILE * TILE];
         for i in 0..all {
             let site = Site { phi: way.phi[i], down: way.down(cells, i), next: way.next[i] };
-            sites[in_tiles(i % cells.n[0], i / cells.n[0], tiles[0])] = site;
+            sites[in_tiles(i % cells.grid.n[0], i / cells.grid.n[0], tiles[0])] = site;
         }
-        Self { origin: cells.origin, side: cells.side, n: cells.n, sites }
+        Self { origin: cells.grid.origin, side: cells.grid.side, n: cells.grid.n, sites }
     }
 
     /// The four cells around a place, with their weights.
@@ -239,7 +267,7 @@ struct Solution {
 impl Solution {
     /// Distances around a target.
     fn begin(&mut self, plan: &Plan, cells: &mut Cells, target: Target, radius: f64) {
-        let far = EXACT * cells.side;
+        let far = EXACT * cells.grid.side;
         let (line, beyond, next) = match target {
             Target::Gate(g) => {
                 let [a, b] = plan.gates[g].line;

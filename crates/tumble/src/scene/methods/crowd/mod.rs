@@ -6,10 +6,11 @@ use super::{MethodRules, is_in, scheme_of_its_own};
 use crate::math::functions::exp;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
+use crate::scene::laws::flat;
 use crate::system::System;
 use crate::systems::crowd::{
-    AnticipationVelocity, CollisionFreeSpeed, Crowd as People, Floor, Gate, Goal, Line, Model, Orca, Plan as Walls, Point, Settings, Slope,
-    SocialForce, journeys, nearest,
+    AnticipationVelocity, CollisionFreeSpeed, Crowd as People, Floor, Frailty, Gate, Goal, Line, Model, Orca, Plan as Walls, Point,
+    Settings, Slope, SocialForce, journeys, nearest,
 };
 use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
@@ -20,6 +21,8 @@ use tumble_interface::scene::{
 };
 use tumble_interface::{Issue, Warning};
 
+/// Mass of a person [kg].
+const MASS: f64 = 80.0;
 /// Bytes for a person: its row three times, and what a step needs.
 const PERSON: f64 = 600.0;
 /// Bytes for a cell of a floor, and for each way across it.
@@ -90,7 +93,7 @@ fn model(words: &Walking) -> Model {
     match words.model {
         Steering::CollisionFreeSpeed => Model::CollisionFreeSpeed(CollisionFreeSpeed { time_gap: words.time_gap.unwrap_or(0.65), buffer }),
         Steering::SocialForce => {
-            Model::SocialForce(SocialForce { mass: words.mass.unwrap_or(80.0), relaxation: words.relaxation.unwrap_or(0.5) })
+            Model::SocialForce(SocialForce { mass: words.mass.unwrap_or(MASS), relaxation: words.relaxation.unwrap_or(0.5) })
         }
         Steering::AnticipationVelocity => {
             Model::AnticipationVelocity(AnticipationVelocity { time_gap: words.time_gap.unwrap_or(0.5), buffer })
@@ -99,15 +102,35 @@ fn model(words: &Walking) -> Model {
     }
 }
 
-/// Words of another model.
-fn check_model(plan: &Plan, issues: &mut Vec<Issue>) {
+fn frailty(words: &Walking, flat: bool) -> Frailty {
+    Frailty {
+        mass: words.mass.unwrap_or(MASS),
+        fall_speed: words.fall_speed.unwrap_or(1.0),
+        rise_time: words.rise_time.unwrap_or(5.0),
+        injury_energy: words.injury_energy.unwrap_or(79.0),
+        flat,
+    }
+}
+
+/// Words of another model, and words for blows where there is nothing that hits.
+fn check_model(plan: &Plan, bodies: bool, issues: &mut Vec<Issue>) {
     let Some(words) = &plan.crowd else { return };
+    for (word, given) in [
+        ("fall_speed", words.fall_speed.is_some()),
+        ("rise_time", words.rise_time.is_some()),
+        ("injury_energy", words.injury_energy.is_some()),
+    ] {
+        if given && !bodies {
+            let message = "of people whom a [[body]] hits, and there is none; leave it out, or add one";
+            issues.push(Issue::new(format!("system \"{}\".crowd.{word}", plan.name), message));
+        }
+    }
     let gaps = matches!(words.model, Steering::CollisionFreeSpeed | Steering::AnticipationVelocity);
     let (forces, clear) = (words.model == Steering::SocialForce, words.model == Steering::Orca);
     let of = [
         ("time_gap", words.time_gap.is_some() && !gaps, "collision_free_speed and anticipation_velocity"),
         ("buffer", words.buffer.is_some() && !gaps, "collision_free_speed and anticipation_velocity"),
-        ("mass", words.mass.is_some() && !forces, "social_force"),
+        ("mass", words.mass.is_some() && !forces && !bodies, "social_force, and of people whom a [[body]] hits"),
         ("relaxation", words.relaxation.is_some() && !forces, "social_force"),
         ("time_horizon", words.time_horizon.is_some() && !clear, "orca"),
     ];
@@ -321,7 +344,7 @@ impl MethodRules for Rules {
                 let message = format!("{} plans, expected one [[plan]] with the walls, doors and exits of its floor", floors.len());
                 issues.push(Issue::new(format!("system \"{}\"", plan.name), message));
             }
-            check_model(plan, issues);
+            check_model(plan, !scene.body.is_empty(), issues);
             let radius = crowds.iter().map(|thing| largest(thing)).fold(0.0, f64::max);
             for thing in &floors {
                 check_places(thing, issues);
@@ -349,10 +372,11 @@ impl MethodRules for Rules {
             ..Look::new(&t.name, Form::Points, t.color.unwrap_or(tumble_interface::looks::SOLID)).with_radius(0.04)
         };
         let mut looks: Vec<Look> = floors.iter().map(wall).collect();
+        let form = if flat(scene).is_some() { Form::Points } else { Form::Instances };
         let people = |t: &&Crowd| Look {
             trail: t.trail,
             few: t.people() < FEW,
-            ..Look::new(&t.name, Form::Points, colors.pick(t.color)).with_radius(t.radius)
+            ..Look::new(&t.name, form, colors.pick(t.color)).with_radius(t.radius)
         };
         looks.extend(crowds.iter().map(people));
         looks
@@ -381,7 +405,8 @@ impl MethodRules for Rules {
             return None;
         }
         let thing = *floors.first()?;
-        let model = model(&plan.crowd.clone().unwrap_or_default());
+        let words = plan.crowd.clone().unwrap_or_default();
+        let model = model(&words);
         let gates: Vec<Gate> = gates(thing).into_iter().map(|(_, gate)| gate).collect();
         let goals = |crowd: &Crowd| {
             let may = |gate: &Gate| gate.exit && (crowd.exit.is_empty() || crowd.exit.contains(&gate.name));
@@ -404,6 +429,9 @@ impl MethodRules for Rules {
             substeps: plan.substeps,
             step: plan.step,
             model,
+            frailty: (!scene.body.is_empty()).then(|| frailty(&words, flat(scene).is_some())),
+            flat: flat(scene).is_some(),
+            mass: words.mass.unwrap_or(MASS),
             plan: thing.name.clone(),
             crowds: crowds.iter().map(|crowd| crowd.name.clone()).collect(),
             journeys,

@@ -1,0 +1,196 @@
+//! Rigid bodies among people: blows, falls, injuries, pushes, and ways that bodies close. See docs/theory/crowds.md.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
+use crate::common::{column, positions, run, simulation, step, velocities};
+use crate::crowds::{crowd, gate, plan};
+use tumble_f64::scene::Simulation;
+use tumble_interface::Engine;
+
+const FPS: usize = 100;
+const G: f64 = 9.81;
+
+/// A corridor of 20 m x 4 m with an exit at its right end, in space, with this gravity.
+fn words(gravity: f64, people: &str, rest: &str) -> String {
+    let walls = "[[[20, 0], [0, 0], [0, 4], [20, 4]]]";
+    let floor = plan(walls, &gate("exit", "out", [20.0, 0.0], [20.0, 4.0]));
+    format!("time = {{ fps = {FPS}, frames = 100000 }}\nworld.gravity = [0, 0, {}]\n", -gravity) + &floor + &crowd(people) + rest
+}
+
+fn ball(mass: f64, position: [f64; 3], velocity: [f64; 3]) -> String {
+    let shape = "shape = { sphere = { radius = 0.2 } }";
+    format!("[[body]]\nname = \"rock\"\n{shape}\nmass = {mass}\nposition = [{position:?}]\nvelocity = [{velocity:?}]\n")
+}
+
+fn cube(size: [f64; 3], mass: f64, at: [f64; 2], friction: f64) -> String {
+    let shape = format!("shape = {{ box = {{ size = {size:?} }} }}");
+    let position = [at[0], at[1], 0.5 * size[2]];
+    format!("[[body]]\nname = \"crate\"\n{shape}\nmass = {mass}\nposition = [{position:?}]\nfriction = {friction}\n")
+        + "[[collider]]\nname = \"ground\"\nshape = { floor = {} }\n"
+}
+
+/// How many lie, and how many are injured.
+fn fallen(sim: &Simulation) -> [u64; 2] {
+    let ledger = sim.ledger();
+    [ledger.fallen.unwrap(), ledger.injured.unwrap()]
+}
+
+/// Somebody who stands still, and a ball that hits at the height of the middle: the velocities after the blow, and who lies.
+fn struck(mass: f64, speed: f64) -> (f64, f64, [u64; 2]) {
+    let at = [10.0, 2.0];
+    let start = [at[0] - 0.18 - 0.2 - 0.5 * speed / FPS as f64, at[1], 1.0];
+    let text = words(0.0, &format!("position = [{at:?}]\nreaction = 1000"), &ball(mass, start, [speed, 0.0, 0.0]));
+    let mut sim = simulation(&text);
+    assert_eq!(fallen(&sim), [0, 0]);
+    let mut v = velocities(&sim, "rock")[0];
+    while v.x > 0.99 * speed {
+        assert!(sim.time() < 0.1, "no blow");
+        step(&mut sim);
+        v = velocities(&sim, "rock")[0];
+    }
+    assert!(v.y.abs() < 1e-3 * speed && v.z.abs() < 1e-3 * speed, "{v:?}");
+    let lies = fallen(&sim);
+    let x = |sim: &Simulation| positions(sim, "people")[0].x;
+    // Whoever is pushed stops by a deceleration of 5 m/s².
+    run(&mut sim, 100);
+    (v.x, (2.0 * 5.0 * (x(&sim) - at[0])).sqrt(), lies)
+}
+
+#[test]
+fn a_blow_is_plastic_and_throws_down_or_injures_by_its_size() {
+    for (mass, speed, lies) in [
+        // By 0.12 m/s and 24 J; by 0.5 m/s and 30 J; by 1.07 m/s and 64 J; by 1 m/s and 200 J.
+        (2.0, 5.0, [0, 0]),
+        (40.0, 1.5, [0, 0]),
+        (200.0, 1.5, [1, 0]),
+        (20.0, 5.0, [0, 1]),
+    ] {
+        let (rock, person, found) = struck(mass, speed);
+        let impulse = speed / (1.0 / 80.0 + 1.0 / mass);
+        let (expected, gain) = (speed - impulse / mass, impulse / 80.0);
+        // Whoever is pushed brakes by 0.05 m/s a frame, and what touches with it.
+        assert!((rock - expected).abs() < 0.06, "{mass} kg: {rock} m/s, expected {expected}");
+        // In steps of h the way is longer by v h / 2.
+        assert!((person - gain).abs() < 0.06 * gain + 0.02, "{mass} kg: {person} m/s, expected {gain}");
+        assert_eq!(found, lies, "{mass} kg at {speed} m/s");
+    }
+}
+
+#[test]
+fn who_has_fallen_rises_and_goes_on_and_who_is_injured_stays() {
+    for (mass, speed, stays) in [(200.0, 1.5, false), (20.0, 5.0, true)] {
+        let start = [9.0, 2.0, 1.0];
+        let text = words(0.0, "position = [[10, 2]]\nspeed_deviation = 0\nreaction = 1", &ball(mass, start, [speed, 0.0, 0.0]));
+        let mut sim = simulation(&text);
+        let mut lay = 0;
+        for _ in 0..20 * FPS {
+            step(&mut sim);
+            lay += u64::from(fallen(&sim) != [0, 0]);
+        }
+        let ledger = sim.ledger();
+        if stays {
+            assert_eq!((ledger.people, ledger.injured), (Some(1), Some(1)));
+            assert_eq!(sim.frame(&[]).column("people", "fallen").unwrap().data.numbers(), [2.0]);
+        } else {
+            // 5 s, unless told otherwise.
+            assert_eq!((ledger.people, ledger.left), (Some(0), Some(1)));
+            assert!((lay as f64 / FPS as f64 - 5.0).abs() < 0.05, "{lay}");
+        }
+    }
+}
+
+#[test]
+fn a_rock_that_falls_on_a_head_is_slowed_as_by_a_body_of_that_mass() {
+    // From 2 m above the head; the person stands aside by less than a radius.
+    let text = words(G, "position = [[10, 2]]\nreaction = 1000", &ball(50.0, [10.0, 2.0, 1.75 + 0.2 + 2.0], [0.0; 3]));
+    let mut sim = simulation(&text);
+    let mut before = 0.0;
+    while fallen(&sim) == [0, 0] {
+        assert!(sim.time() < 1.0, "no blow");
+        before = velocities(&sim, "rock")[0].z;
+        step(&mut sim);
+    }
+    // What the rock gets comes on its next turn.
+    step(&mut sim);
+    let (after, speed) = (velocities(&sim, "rock")[0].z, (2.0 * G * 2.0_f64).sqrt());
+    assert!((-before - speed).abs() < 0.15, "{before}");
+    // m v / (m + M), and what a frame of weight adds.
+    let slowed = before * 50.0 / 130.0;
+    assert!((after - slowed).abs() < 0.2, "{before} m/s before, {after} after, expected {slowed}");
+    assert_eq!(fallen(&sim), [0, 1]);
+}
+
+#[test]
+fn people_push_what_is_light_and_walk_around_what_is_heavy() {
+    for (mass, moves) in [(15.0, true), (800.0, false)] {
+        let text = words(G, "position = [[5, 2]]\nspeed_deviation = 0", &cube([0.6, 0.6, 0.8], mass, [8.0, 2.0], 0.3));
+        let mut sim = simulation(&text);
+        let mut nearest = f64::INFINITY;
+        while sim.ledger().people.unwrap() > 0 {
+            assert!(sim.time() < 40.0, "{mass} kg: still there at {:?}", positions(&sim, "people"));
+            step(&mut sim);
+            let (p, b) = (positions(&sim, "people"), positions(&sim, "crate")[0]);
+            if let Some(p) = p.first() {
+                let beyond = |d: f64| (d.abs() - 0.3).max(0.0);
+                nearest = nearest.min((beyond(p.x - b.x).powi(2) + beyond(p.y - b.y).powi(2)).sqrt() - 0.18);
+            }
+        }
+        let b = positions(&sim, "crate")[0];
+        let way = (b.x - 8.0).hypot(b.y - 2.0);
+        assert!(if moves { way > 0.2 } else { way < 1e-3 }, "{mass} kg: moved by {way} m");
+        // Nobody is inside.
+        assert!(nearest > -0.02 && nearest < 0.1, "{mass} kg: {nearest} m");
+        assert_eq!(fallen(&sim), [0, 0]);
+    }
+}
+
+#[test]
+fn a_body_that_fills_a_corridor_sends_everybody_the_other_way() {
+    let walls = "[[[0, 0], [20, 0]], [[0, 2], [20, 2]]]";
+    let gates = gate("exit", "east", [20.0, 0.0], [20.0, 2.0]) + &gate("exit", "west", [0.0, 0.0], [0.0, 2.0]);
+    let people = crowd("area = [[12, 0.3], [16, 1.7]]\ncount = 8");
+    let scene = |rest: &str| {
+        let start = format!("time = {{ fps = {FPS}, frames = 100000 }}\nworld.gravity = [0, 0, {}]\n", -G);
+        simulation(&(start + &plan(walls, &gates) + &people + rest))
+    };
+    // Ends and falls to the floor within a second: then the way is closed.
+    let slab = cube([1.0, 1.9, 2.0], 4000.0, [18.5, 1.0], 0.6).replace("1.0]]", "1.2]]");
+    for (rest, east) in [("", 8.0), (&*slab, 0.0)] {
+        let mut sim = scene(rest);
+        while sim.ledger().people.unwrap() > 0 {
+            assert!(sim.time() < 40.0, "{:?}", positions(&sim, "people"));
+            step(&mut sim);
+            assert_eq!(sim.ledger().stranded, Some(0));
+        }
+        let crossings = sim.frame(&[]).column("floor", "crossings").unwrap().data.numbers();
+        assert_eq!([crossings[0] + crossings[1], crossings[2] + crossings[3]], [east, 8.0 - east]);
+    }
+}
+
+#[test]
+fn rocks_among_people_give_the_same_bits_on_any_count_of_threads_and_after_a_restore() {
+    let rocks = "[[body]]\nname = \"rock\"\nshape = { box = { size = [0.5, 0.4, 0.3] } }\nposition = [[8, 2, 4], [9, 1, 3], [10, 3, 5], [7, 2.5, 2.5]]\n\
+                 rotate = [[20, 30, 0]]\nfriction = 0.6\n[[collider]]\nname = \"ground\"\nshape = { floor = {} }\n";
+    let text = words(G, "area = [[5, 0.3], [11, 3.7]]\ncount = 30", rocks);
+    let once = |threads: usize, restore: bool| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut sim = simulation(&text);
+            for frame in 0..300 {
+                step(&mut sim);
+                if restore && frame % 70 == 0 {
+                    let saved = sim.save(&[]);
+                    sim = simulation(&text);
+                    sim.restore(&saved).unwrap();
+                }
+            }
+            assert!(sim.ledger().injured.unwrap() > 0 && sim.ledger().people.unwrap() > 20);
+            let bits = |object: &str, name: &str| -> Vec<u64> {
+                column(&sim, object, name).into_iter().flat_map(<[f64; 3]>::from).map(f64::to_bits).collect()
+            };
+            [bits("people", "position"), bits("people", "velocity"), bits("rock", "position"), bits("rock", "velocity")]
+        })
+    };
+    let reference = once(1, false);
+    assert!(reference == once(2, false) && reference == once(8, false) && reference == once(2, true));
+}
