@@ -50,6 +50,35 @@ def test_the_narrow_door_costs_the_most_and_a_wider_one_saves() -> None:
     assert changed.gate == "door" and 0.15 < changed.saved.mean / found.lost.mean < 0.7 and changed.earlier.mean > 3.0
 
 
+def test_rocks_cost_people_and_time_and_the_report_says_whom_they_hit_when(tmp_path: Path) -> None:
+    scene = tree(12) | {"dimension": 3}
+    del scene["plane"]
+    rock = {"name": "rock", "shape": {"sphere": {"radius": 0.3}}, "mass": 200, "rolling_friction": 0.3}
+    # Two stones fall before the door, from 2 and 3 m above heads.
+    places = [[5.4, 2.0, 4.0], [4.6, 2.0, 5.0]]
+    scene["body"] = [rock | {"position": places}]
+    scene["collider"] = [{"name": "ground", "shape": {"floor": {}}}]
+    scene["crowd"] = [{"name": "people", "area": [[3.5, 1.2], [5.6, 2.8]], "count": 12}]
+    found = study(Scene(scene), seeds=2)
+    assert not found.stuck and len(found.without) == 2
+    last, lost, injured = (found.bodies[what] for what in ("last_out", "lost", "injured"))
+    assert injured[0].mean >= 1.0 and injured[1].mean == 0.0
+    assert lost[0].mean > lost[1].mean and last[0].n == last[1].n == 2
+    for run in found.outcomes:
+        assert run.left + run.injured == run.people == 12
+        times, states = run.hits[:, 0], run.hits[:, 3]
+        # A fall from 1.95 m lasts 0.63 s; samples are 0.5 s apart.
+        assert 0.5 <= times.min() <= 1.0 and (states == 2).sum() == run.injured
+        assert passages.unpacked(passages.packed(run)).hits.tolist() == run.hits.tolist()
+    report.write(found, tmp_path)
+    with (tmp_path / "hits.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(len(run.hits) for run in found.outcomes)
+    assert "people are injured" in (tmp_path / "bottlenecks.html").read_text(encoding="utf-8")
+    quiet = study(Scene(tree(4)), seeds=1)
+    assert quiet.without == () and quiet.bodies == {} and quiet.outcomes[0].injured == 0
+
+
 def test_numbers_do_not_depend_on_the_workers() -> None:
     one, two = (study(Scene(tree(20)), seeds=2, widen=0.2, first=1, workers=workers) for workers in (1, 2))
     assert one.rows == two.rows and one.widened == two.widened

@@ -56,8 +56,12 @@ class Outcome:
     """When the last left [s]; nan if not all did."""
     left: int
     people: int
+    injured: int
+    """How many bodies have injured: they do not leave."""
     lost: float
     """Person-seconds lost by all."""
+    hits: Floats
+    """Who was hit: time of the sample after it [s], crowd, number of the person, 1 for a fall or 2 for an injury, place [m]."""
     times: Floats
     """Of the samples [s]."""
     present: Floats
@@ -87,7 +91,7 @@ def box(plan: Mapping[str, Any]) -> tuple[tuple[float, float], tuple[int, int]]:
 
 
 def run(scene: Scene, limit: float) -> Outcome:
-    """Runs a scene until all have left or `limit` [s] is over."""
+    """Runs a scene until all who can have left or `limit` [s] is over."""
     world, tree = World(scene), scene.to_dict()
     plan, crowds = tree["plan"][0], {crowd["name"]: crowd["speed"] for crowd in tree["crowd"]}
     stride = max(1, round(SAMPLE * tree["time"]["fps"]))
@@ -97,10 +101,13 @@ def run(scene: Scene, limit: float) -> Outcome:
     times, present, counts, densities = [], [], [], []
     people = int(world.ledger["people"] or 0)
     previous = 0.0
+    hits: list[Floats] = []
+    lay: dict[tuple[int, int], int] = {}
     while True:
         columns, time = world.columns("position", "velocity"), world.time
         own = columns[plan["name"]]
-        for name, desired in crowds.items():
+        for k, (name, desired) in enumerate(crowds.items()):
+            hits += _hits(lay, k, columns[name], time)
             x, v = columns[name]["position"], columns[name]["velocity"]
             at = ((x[:, :2] - origin) / CELL).astype(int).clip(0, (nx - 1, ny - 1))
             cell = at[:, 0] + nx * at[:, 1]
@@ -108,12 +115,12 @@ def run(scene: Scene, limit: float) -> Outcome:
             slow = np.hypot(v[:, 0], v[:, 1]) < WAITS * desired
             waiting += (time - previous) * np.bincount(cell[slow], minlength=nx * ny)
         previous = time
-        here = int(world.ledger["people"] or 0)
+        here, injured = (int(world.ledger[what] or 0) for what in ("people", "injured"))
         times.append(time)
         present.append(here)
         counts.append(own["crossings"].sum(axis=1))
         densities.append(own["gate_density"].reshape(-1))
-        if here == 0 or time >= limit:
+        if here == injured or time >= limit:
             break
         world.step(stride)
     series, peaks = np.array(counts, float), np.max(densities, axis=0)
@@ -122,7 +129,8 @@ def run(scene: Scene, limit: float) -> Outcome:
         _passage(series[:, g], times, own["crossing_times"][g], peaks[g], own["gate_waiting"], own["gate_lost"], g)
         for g in range(series.shape[1])
     ]
-    last = float(np.nanmax(own["crossing_times"][:, 1])) if here == 0 else math.nan
+    left = np.isfinite(own["crossing_times"][:, 1]).any() and here == injured
+    last = float(np.nanmax(own["crossing_times"][:, 1])) if left else math.nan
     area = CELL * CELL
     return Outcome(
         int(tree["seed"]),
@@ -130,12 +138,26 @@ def run(scene: Scene, limit: float) -> Outcome:
         last,
         int(ledger["left"] or 0),
         people,
+        injured,
         float(ledger["lost"] or 0.0),
+        np.array(hits).reshape(-1, 6),
         np.array(times),
         np.array(present, float),
         (seconds / area).reshape(shape),
         (waiting / area).reshape(shape),
     )
+
+
+def _hits(lay: dict[tuple[int, int], int], crowd: int, columns: Mapping[str, Any], time: float) -> list[Floats]:
+    """Who of a crowd lies now and was on its feet, or only lay, at the last sample."""
+    found = []
+    for row, state in enumerate(columns["fallen"].tolist() if "fallen" in columns else ()):
+        person = int(columns["id"][row])
+        if state > lay.get((crowd, person), 0):
+            x, y, _ = columns["position"][row]
+            found.append(np.array([time, crowd, person, state, x, y]))
+        lay[crowd, person] = state
+    return found
 
 
 def _passage(
@@ -162,9 +184,10 @@ def packed(found: Outcome) -> bytes:
     data = io.BytesIO()
     np.savez_compressed(
         data,
-        whole=np.array([found.seed, found.left, found.people]),
+        whole=np.array([found.seed, found.left, found.people, found.injured]),
         parts=np.array([found.last_out, found.lost]),
         numbers=numbers.reshape(-1, len(_NUMBERS)),
+        hits=found.hits,
         counts=np.array([p.counts for p in found.passages]).reshape(len(found.passages), -1),
         times=found.times,
         present=found.present,
@@ -178,7 +201,7 @@ def unpacked(data: bytes) -> Outcome:
     """Raises ValueError where that is none."""
     with np.load(io.BytesIO(data)) as kept:
         arrays = {name: kept[name] for name in kept.files}
-    seed, left, people = map(int, arrays["whole"])
+    seed, left, people, injured = map(int, arrays["whole"])
     last_out, lost = map(float, arrays["parts"])
     passages = []
     for row, counts in zip(arrays["numbers"].tolist(), arrays["counts"], strict=True):
@@ -190,6 +213,7 @@ def unpacked(data: bytes) -> Outcome:
         last_out,
         left,
         people,
+        injured,
         lost,
-        *(arrays[name] for name in ("times", "present", "density", "waiting")),
+        *(arrays[name] for name in ("hits", "times", "present", "density", "waiting")),
     )

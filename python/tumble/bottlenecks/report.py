@@ -32,7 +32,9 @@ _LISTED = ("flow", "peak_flow", "peak_density", "waiting", "lost")
 
 
 def write(found: Findings, folder: Path) -> list[Path]:
-    """Writes bottlenecks.csv, plan.png, waiting.png, exits.png and bottlenecks.html. Raises ExportError."""
+    """Writes bottlenecks.csv, plan.png, waiting.png, exits.png and bottlenecks.html, and hits.csv of a scene with bodies.
+
+    Raises ExportError."""
     folder.mkdir(parents=True, exist_ok=True)
     seeds = len(found.outcomes)
     mean = {what: sum(getattr(run, what) for run in found.outcomes) / seeds for what in ("density", "waiting")}
@@ -44,8 +46,23 @@ def write(found: Findings, folder: Path) -> list[Path]:
     for name, picture in pictures.items():
         write_whole(folder / name, picture)
     write_whole(folder / "bottlenecks.csv", _csv(found).encode())
+    tables = ["bottlenecks.csv"]
+    if found.without:
+        write_whole(folder / "hits.csv", _hits(found).encode())
+        tables.append("hits.csv")
     write_whole(folder / "bottlenecks.html", _page(found).encode())
-    return [folder / name for name in ("bottlenecks.csv", *pictures, "bottlenecks.html")]
+    return [folder / name for name in (*tables, *pictures, "bottlenecks.html")]
+
+
+def _hits(found: Findings) -> str:
+    """Who was hit when and where, seed by seed."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["seed", "time [s]", "crowd", "person", "injured", "x [m]", "y [m]"])
+    for run in found.outcomes:
+        for time, crowd, person, state, x, y in run.hits.tolist():
+            writer.writerow([run.seed, time, int(crowd), int(person), int(state > 1), round(x, 3), round(y, 3)])
+    return text.getvalue()
 
 
 def _csv(found: Findings) -> str:
@@ -164,6 +181,13 @@ def number(found: Spread, digits: int) -> str:
     return f"{found.mean:.{digits}f}" + (f" ± {found.std:.{digits}f}" if found.n > 1 else "")
 
 
+def said(found: Findings, side: int) -> str:
+    """How it ended with the bodies (side 0), or without them (1)."""
+    last, lost, injured = (found.bodies[what][side] for what in ("last_out", "lost", "injured"))
+    text = f"the last is out after {number(last, 1)} s, {number(lost, 0)} person-seconds are lost"
+    return f"{text}, {number(injured, 1)} people are injured" if side == 0 else text
+
+
 def _page(found: Findings) -> str:
     seeds = [run.seed for run in found.outcomes]
     people = found.outcomes[0].people
@@ -175,6 +199,11 @@ def _page(found: Findings) -> str:
     ]
     points += [f"made {w.by:g} m wider, {escape(w.gate)} would save {number(w.saved, 0)} person-seconds, and the last "
                f"be out {number(w.earlier, 1)} s earlier" for w in found.widened]  # fmt: skip
+    if found.without:
+        points.append(
+            f"with the bodies {said(found, 0)}; without them {said(found, 1)}. Who was hit when is in "
+            '<a href="hits.csv">hits.csv</a>'
+        )
     points += [f"{escape(gate)} was not made wider: {FIXED}" for gate in found.fixed]
     points += [f"with seed {seed} not all left in time" for seed in found.stuck]
     pictures = [("Ranked gates", "plan.png"), ("Waiting", "waiting.png"), ("Over time", "exits.png")]

@@ -60,6 +60,8 @@ class Findings:
     """Gates by time lost, the worst first."""
     outcomes: tuple[Outcome, ...]
     """Seed by seed."""
+    without: tuple[Outcome, ...]
+    """The same seeds without the scene's bodies; empty of a scene that has none."""
     widened: tuple[Widened, ...]
     fixed: tuple[str, ...]
     """Gates that were to be made wider, but at whose jambs no wall ends."""
@@ -77,7 +79,18 @@ class Findings:
     @property
     def stuck(self) -> list[int]:
         """Seeds with which not all left in time."""
-        return [run.seed for run in self.outcomes if run.left < run.people]
+        return [run.seed for run in self.outcomes if run.left + run.injured < run.people]
+
+    @property
+    def bodies(self) -> dict[str, tuple[Spread, Spread]]:
+        """What the bodies cost: last out [s], time lost [s] and people injured, with and without them."""
+        with_and_without = {
+            what: tuple(
+                spread([float(getattr(run, what)) for run in runs], what) for runs in (self.outcomes, self.without)
+            )
+            for what in ("last_out", "lost", "injured")
+        }
+        return {what: (a, b) for what, (a, b) in with_and_without.items()} if self.without else {}
 
 
 def study(
@@ -92,9 +105,10 @@ def study(
 ) -> Findings:
     """Runs a scene of a plan and crowds with so many seeds, counted from its own, until all have left or `limit` [s] is over.
 
-    With `widen` [m], each of the `first` gates of the ranking is made so much wider, and all seeds are run again. `on` is
-    "cores", "dask" or the address of a Dask scheduler, as in `tumble.sweep`; `tell` is called with the runs done and the runs
-    in all. The numbers do not depend on `on` and `workers`. Raises SceneError; StepError where a run breaks.
+    A scene with bodies is run without them, too, and without their joints. With `widen` [m], each of the `first` gates of the
+    ranking is made so much wider, and all seeds are run again. `on` is "cores", "dask" or the address of a Dask scheduler, as
+    in `tumble.sweep`; `tell` is called with the runs done and the runs in all. The numbers do not depend on `on` and
+    `workers`. Raises SceneError; StepError where a run breaks.
     """
     tree = scene.to_dict()
     if len(tree["plan"]) != 1 or not tree["crowd"]:
@@ -102,7 +116,8 @@ def study(
     World(scene, 1)  # Tells what is wrong with it before anything runs.
     plan = tree["plan"][0]
     runs = _Runs(scene, [int(tree["seed"]) + k for k in range(seeds)], limit, on, workers, tell)
-    (outcomes,) = runs.of([()])
+    alone = ("body=[]", "joint=[]") if tree["joint"] else ("body=[]",)
+    outcomes, *without = runs.of([(), alone] if tree["body"] else [()])
     rows = _ranked(plan, outcomes)
     wider = [(row, widened(plan, row.gate, widen)) for row in rows[:first]] if widen > 0.0 else []
     tried = [(row, new) for row, new in wider if new is not None]
@@ -113,7 +128,9 @@ def study(
         earlier = spread([a.last_out - b.last_out for a, b in pairs], f"earlier {row.gate}")
         changed.append(Widened(row.gate, widen, saved, earlier))
     fixed = tuple(row.gate for row, new in wider if new is None)
-    return Findings(str(tree["title"]), plan, tuple(rows), tuple(outcomes), tuple(changed), fixed, box(plan)[0])
+    return Findings(
+        str(tree["title"]), plan, tuple(rows), tuple(outcomes), tuple(*without), tuple(changed), fixed, box(plan)[0]
+    )
 
 
 def _overrides(plan: Mapping[str, Any]) -> tuple[str, ...]:

@@ -69,7 +69,8 @@ def bottlenecks(
 ) -> None:
     """Rank the doors of a plan by the time that people lose in their queues.
 
-    Writes bottlenecks.html, bottlenecks.csv and pictures of the plan. Runs end when all people have left.
+    Writes bottlenecks.html, bottlenecks.csv and pictures of the plan. Runs end when all people have left. A scene with
+    bodies is run without them, too: what falling rocks cost, and who was hit when.
 
     In a drawing, the name of its layer says what a line is: wall, door, exit, or start, an area where people are; A-WALL,
     Türen or sortie are understood, too. In SVG a layer is the label, class or id of an element or a group, beside data-name,
@@ -199,8 +200,9 @@ def _say(found: "Findings", files: list[Path], json: bool) -> None:
             for w in found.widened
         ]
         whole = {"last_out": found.last_out.__dict__, "lost": found.lost.__dict__}
-        told = {"rows": rows, "widened": changed, "fixed": found.fixed, **whole, "stuck": found.stuck, "files": files}
-        find.say_json({"ok": not found.stuck, **told})
+        bodies = {what: {"with": a.__dict__, "without": b.__dict__} for what, (a, b) in found.bodies.items()}
+        told = {"rows": rows, "widened": changed, "fixed": found.fixed, **whole, "bodies": bodies, "stuck": found.stuck}
+        find.say_json({"ok": not found.stuck, **told, "files": files})
     else:
         _say_rows(found)
         for file in files:
@@ -210,7 +212,7 @@ def _say(found: "Findings", files: list[Path], json: bool) -> None:
 
 
 def _say_rows(found: "Findings") -> None:
-    from tumble.bottlenecks.report import FIXED, HEAD, cells, number
+    from tumble.bottlenecks.report import FIXED, HEAD, cells, number, said
 
     rows = [list(HEAD), *(cells(row) for row in found.rows)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(HEAD))]
@@ -224,6 +226,9 @@ def _say_rows(found: "Findings") -> None:
     for w in found.widened:
         gain = f"{number(w.saved, 0)} person-seconds saved, last out {number(w.earlier, 1)} s earlier"
         say(f"{w.gate} wider by {w.by:g} m: {gain}")
+    if found.without:
+        say(f"with the bodies {said(found, 0)}")
+        say(f"without them {said(found, 1)}")
     for gate in found.fixed:
         say(f"{gate} was not made wider: {FIXED}; end walls there, or --repair")
     for seed in found.stuck:
