@@ -1,5 +1,5 @@
-"""The browser's engine in headless Chromium, whose registers have 128 bits, against the native one held to 256 bits, on one thread; and
-what a tab can do in real time. Needs `make web` and Chromium."""
+"""The browser's engine in headless Chromium, whose registers have 128 bits, against the native one held to 256 bits, on one
+thread; and what a tab can do in real time. Needs `make web` and Chromium."""
 
 import json
 import os
