@@ -1,7 +1,7 @@
 //! People, and what is around one of them: walls, others, and where it can go.
 
-use super::bodies::Touch;
 use super::plan::{Plan, Point, along, cross, dot, length, nearest, sub};
+use super::touch::Touch;
 use crate::math::functions::exp;
 
 /// Somebody.

@@ -15,6 +15,7 @@ use super::around::Person;
 use super::floor::Floor;
 use super::near::Near;
 use super::plan::{Point, length};
+use super::touch::Touch;
 use crate::exchange::{Exchange, Turn, Visit};
 use crate::geometry::{Collider, Vector};
 use crate::math::functions::{cos, sin};
@@ -31,10 +32,6 @@ const TOUCH: f64 = 0.05;
 const BRAKES: f64 = 5.0;
 /// How far from a person bodies are seen [m].
 const SIGHT: f64 = 1.0;
-/// The least horizontal part of a normal at which a body is ahead, and not overhead.
-const AHEAD: f64 = 0.3;
-/// Who overlaps with a body gets out by this in a step at most [m].
-const OUT: f64 = 0.05;
 /// Speed below which a body rests [m/s].
 const REST: f64 = 0.05;
 /// Friction on the floor by which people judge what they can push.
@@ -57,40 +54,6 @@ pub struct Frailty {
     pub injury_energy: f64,
     /// Whether people are disks in a plane.
     pub flat: bool,
-}
-
-/// A body near a person.
-#[derive(Debug, Clone, Copy)]
-pub struct Touch {
-    /// Row of the person.
-    row: u32,
-    /// The body.
-    body: u32,
-    /// Unit vector from the body to the person.
-    n: Vector,
-    /// Distance between their surfaces [m].
-    gap: f64,
-    /// The place on the body.
-    at: Vector,
-}
-
-impl Touch {
-    /// The horizontal direction to the person, unless the body is overhead.
-    fn ahead(&self) -> Option<Point> {
-        let size = length([self.n.x, self.n.y]);
-        (size > AHEAD).then(|| [self.n.x / size, self.n.y / size])
-    }
-
-    /// From a person of this radius to the nearest place of the body in plan, and its length [m].
-    pub fn wall(&self, radius: f64) -> Option<(Point, f64)> {
-        let far = self.gap + radius;
-        self.ahead().map(|n| (n.map(|n| -n * far), far))
-    }
-
-    /// The way out of the body [m].
-    pub fn out(&self) -> Point {
-        self.ahead().map_or([0.0; 2], |n| n.map(|n| n * (-self.gap).clamp(0.0, OUT)))
-    }
 }
 
 /// The bodies of others among people.

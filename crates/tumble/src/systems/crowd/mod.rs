@@ -14,6 +14,7 @@ mod people;
 mod place;
 mod plan;
 mod tally;
+mod touch;
 mod walk;
 mod way;
 
