@@ -150,6 +150,7 @@ def test_every_column_is_described() -> None:
                 }
             ],
             "crowd": [{"name": "people", "position": [[1, 1]]}],
+            "body": [{"name": "stone", "shape": {"sphere": {"radius": 0.2}}, "position": [[3, 1, 0.5]]}],
         },
     ]
     found: dict[str, set[str]] = {"static": set(), "frames": set()}
