@@ -49,11 +49,7 @@ fn struck(mass: f64, speed: f64) -> (f64, f64, [u64; 2]) {
         v = velocities(&sim, "rock")[0];
     }
     assert!(v.y.abs() < 1e-3 * speed && v.z.abs() < 1e-3 * speed, "{v:?}");
-    let lies = fallen(&sim);
-    let x = |sim: &Simulation| positions(sim, "people")[0].x;
-    // Whoever is pushed stops by a deceleration of 5 m/s².
-    run(&mut sim, 100);
-    (v.x, (2.0 * 5.0 * (x(&sim) - at[0])).sqrt(), lies)
+    (v.x, velocities(&sim, "people")[0].x, fallen(&sim))
 }
 
 #[test]
@@ -70,8 +66,7 @@ fn a_blow_is_plastic_and_throws_down_or_injures_by_its_size() {
         let (expected, gain) = (speed - impulse / mass, impulse / 80.0);
         // Whoever is pushed brakes by 0.05 m/s a frame, and what touches with it.
         assert!((rock - expected).abs() < 0.06, "{mass} kg: {rock} m/s, expected {expected}");
-        // In steps of h the way is longer by v h / 2.
-        assert!((person - gain).abs() < 0.06 * gain + 0.02, "{mass} kg: {person} m/s, expected {gain}");
+        assert!((person - gain).abs() < 0.06, "{mass} kg: {person} m/s, expected {gain}");
         assert_eq!(found, lies, "{mass} kg at {speed} m/s");
     }
 }
