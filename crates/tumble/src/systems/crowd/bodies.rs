@@ -215,7 +215,9 @@ fn nearest(shape: &Collider, visit: &Visit, x: Point, [low, high]: [f64; 2], rad
 /// A body hits a person who overlaps with it.                                                            (crowds.14)
 fn strike(person: &mut Person, body: &mut Visit, touch: &Touch, frailty: &Frailty, t: f64) {
     let n = touch.n;
-    let own = Vector { x: person.v[0], y: person.v[1], z: 0.0 };
+    // Getting out of a body is no velocity: who does not walk has that of blows alone.
+    let [x, y] = if person.walks(t) { person.v } else { person.slide };
+    let own = Vector { x, y, z: 0.0 };
     let closing = (body.state.velocity_at(touch.at) - own).dot(n);
     // Who walks into something slow hits nothing.
     if closing <= 0.0 || body.state.velocity_at(touch.at).dot(n) <= 0.0 {
