@@ -35,8 +35,19 @@ fn fallen(sim: &Simulation) -> [u64; 2] {
     [ledger.fallen.unwrap(), ledger.injured.unwrap()]
 }
 
-/// Somebody who stands still, and a ball that hits at the height of the middle: the velocities after the blow, and who lies.
-fn struck(mass: f64, speed: f64) -> (f64, f64, [u64; 2]) {
+/// What a blow has done.
+struct Blow {
+    /// Velocities after it [m/s].
+    rock: f64,
+    person: f64,
+    lies: [u64; 2],
+    /// Velocity of the rock, and way of the person, a second later [m/s, m].
+    late: f64,
+    way: f64,
+}
+
+/// Somebody who stands still, and a ball that hits at the height of the middle.
+fn struck(mass: f64, speed: f64) -> Blow {
     let at = [10.0, 2.0];
     let start = [at[0] - 0.18 - 0.2 - 0.5 * speed / FPS as f64, at[1], 1.0];
     let text = words(0.0, &format!("position = [{at:?}]\nreaction = 1000"), &ball(mass, start, [speed, 0.0, 0.0]));
@@ -49,7 +60,9 @@ fn struck(mass: f64, speed: f64) -> (f64, f64, [u64; 2]) {
         v = velocities(&sim, "rock")[0];
     }
     assert!(v.y.abs() < 1e-3 * speed && v.z.abs() < 1e-3 * speed, "{v:?}");
-    (v.x, velocities(&sim, "people")[0].x, fallen(&sim))
+    let (person, lies) = (velocities(&sim, "people")[0].x, fallen(&sim));
+    run(&mut sim, FPS);
+    Blow { rock: v.x, person, lies, late: velocities(&sim, "rock")[0].x, way: positions(&sim, "people")[0].x - at[0] }
 }
 
 #[test]
@@ -61,13 +74,24 @@ fn a_blow_is_plastic_and_throws_down_or_injures_by_its_size() {
         (200.0, 1.5, [1, 0]),
         (20.0, 5.0, [0, 1]),
     ] {
-        let (rock, person, found) = struck(mass, speed);
+        let Blow { rock, person, lies: found, late, way } = struck(mass, speed);
         let impulse = speed / (1.0 / 80.0 + 1.0 / mass);
         let (expected, gain) = (speed - impulse / mass, impulse / 80.0);
         // Whoever is pushed brakes by 0.05 m/s a frame, and what touches with it.
         assert!((rock - expected).abs() < 0.06, "{mass} kg: {rock} m/s, expected {expected}");
         assert!((person - gain).abs() < 0.06, "{mass} kg: {person} m/s, expected {gain}");
         assert_eq!(found, lies, "{mass} kg at {speed} m/s");
+        if lies == [0, 0] {
+            // The ball lies against a body that stands: both have come to rest.
+            assert!(late.abs() < 5e-3, "{mass} kg: still at {late} m/s");
+        } else {
+            // It goes on above one that slides to rest by 5 m/s².
+            let slide = gain * gain / (2.0 * 5.0);
+            assert!(
+                (late - expected).abs() < 0.06 && (way - slide).abs() < 0.05 * slide,
+                "{mass} kg: {late} m/s, {way} m, expected {slide}"
+            );
+        }
     }
 }
 
@@ -140,6 +164,18 @@ fn people_push_what_is_light_and_walk_around_what_is_heavy() {
 }
 
 #[test]
+fn who_stands_in_a_body_gets_out() {
+    // The crate from 9.9 to 10.5 m: the middle of the person is 0.1 m inside.
+    let text = words(G, "position = [[10, 2]]\nreaction = 1000", &cube([0.6, 0.6, 0.8], 800.0, [10.2, 2.0], 0.5));
+    let mut sim = simulation(&text);
+    run(&mut sim, FPS);
+    let (p, b) = (positions(&sim, "people")[0], positions(&sim, "crate")[0]);
+    assert!((p.y - 2.0).abs() < 1e-9 && (b.x - 10.2).abs() < 0.01, "{p:?} {b:?}");
+    let gap = b.x - 0.3 - p.x - 0.18;
+    assert!((-5e-3..0.05).contains(&gap), "{gap} m");
+}
+
+#[test]
 fn a_body_that_fills_a_corridor_sends_everybody_the_other_way() {
     let walls = "[[[0, 0], [20, 0]], [[0, 2], [20, 2]]]";
     let gates = gate("exit", "east", [20.0, 0.0], [20.0, 2.0]) + &gate("exit", "west", [0.0, 0.0], [0.0, 2.0]);
@@ -150,7 +186,9 @@ fn a_body_that_fills_a_corridor_sends_everybody_the_other_way() {
     };
     // Ends and falls to the floor within a second: then the way is closed.
     let slab = cube([1.0, 1.9, 2.0], 4000.0, [18.5, 1.0], 0.6).replace("1.0]]", "1.2]]");
-    for (rest, east) in [("", 8.0), (&*slab, 0.0)] {
+    // One that people can push closes nothing.
+    let light = slab.replace("mass = 4000", "mass = 10");
+    for (rest, east) in [("", 8.0), (&*slab, 0.0), (&*light, 8.0)] {
         let mut sim = scene(rest);
         while sim.ledger().people.unwrap() > 0 {
             assert!(sim.time() < 40.0, "{:?}", positions(&sim, "people"));
