@@ -3,6 +3,7 @@
 import copy
 import json
 import os
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,10 @@ import pytest
 if "PYTEST_XDIST_WORKER" in os.environ:
     # A worker keeps a core busy; threads of the engine would wait for those of the other workers.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell that starts tests in the background has them and all that they start ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from tumble import Run
 from tumble.cli import main
