@@ -154,7 +154,7 @@ describe("gallery", () => {
     const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
     console.log(`# first picture after ${(bytes / 1e6).toFixed(2)} MB gzipped`);
     // With the engine, which is above 1 MB, 0.2 MB of them the shapes of rigid bodies; `make validate` has the one that ships, others are larger.
-    assert.ok(bytes > 1e6 && bytes < (WHOLE ? 3.4e6 : 4.2e6), `${bytes} bytes`);
+    assert.ok(bytes > 1e6 && bytes < (WHOLE ? 3.4e6 : 3.9e6), `${bytes} bytes`);
     await context.close();
   });
 });
