@@ -69,11 +69,10 @@ behind:
 
 rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
-	@cargo test $(UNIT_TESTS) --no-run --quiet
 
 lint-rust:
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --workspace --exclude tumble-units --all-targets --quiet -- -D warnings
 
 lint: setup lint-rust
 	$(BIN)/ruff format --quiet --check python benchmarks
@@ -83,14 +82,12 @@ lint: setup lint-rust
 		else echo "no Node here: the source of the browser laboratory is not checked"; fi
 
 # Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
-RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --test '*'
-# Tests within the engine take seconds, and another build of all of it: a quick one.
-UNIT_TESTS := -p tumble --profile unit --lib
+RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests
 
 # Tests tell their time only where RUSTC_BOOTSTRAP is set, as it is here when they run, not when they are built.
 TIMED := --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Zunstable-options --report-time
 test-rust:
-	@mkdir -p target; { cargo test $(UNIT_TESTS) $(TIMED) && cargo test $(RUST_TESTS) $(TIMED); } > target/rust-tests.txt 2>&1 \
+	@mkdir -p target; cargo test $(RUST_TESTS) $(TIMED) > target/rust-tests.txt 2>&1 \
 		|| { cat target/rust-tests.txt; exit 1; }
 	@grep "^test result" target/rust-tests.txt; echo "the ten longest"; \
 		sed -n 's/^test \(.*\) \.\.\. ok <\(.*\)s>$$/\2 s  \1/p' target/rust-tests.txt | sort -rn | head -n 10
@@ -185,8 +182,7 @@ validate: setup openvdb blender wasm
 
 validate-rust:
 	cargo test $(RUST_TESTS) --quiet --no-fail-fast -- --include-ignored --nocapture
-	cargo test $(UNIT_TESTS) --quiet --no-fail-fast -- --include-ignored
-	cargo test $(UNIT_TESTS) --features double --quiet --no-fail-fast -- --include-ignored
+	cargo test -p tumble-units --features double --release --quiet --no-fail-fast -- --include-ignored
 
 validate-python:
 	$(PYTEST) -m "" -rfEP

@@ -1,6 +1,6 @@
 //! The verification tests in double precision of forces, elements, integrators, and fields on grids, in one program:
 //! many small ones take minutes to link. Those of structures, cloth, hair, rods, solids, contact and particles are in `verification.rs`; two
-//! programs keep both cores busy.
+//! programs keep both cores busy. Those that compile kernels of the engine for themselves are in `kernels.rs`.
 //!
 //! `cargo test --release -p tumble-verification --test laws heat::` runs one file of them.
 
@@ -20,7 +20,6 @@ mod crowds;
 mod damping;
 mod densities;
 mod electrostatics;
-mod elements;
 mod fire;
 mod flock;
 mod forces;
@@ -36,7 +35,6 @@ mod liquid_bodies;
 mod liquid_flow;
 mod neighbours;
 mod operators;
-mod pressure;
 mod projections;
 mod reflection;
 mod rimea;

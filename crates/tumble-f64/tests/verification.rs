@@ -1,7 +1,7 @@
 //! The verification tests in double precision of structures, cloth, hair, rods, solids, contact and particles, in one program:
 //! many small ones take minutes to link. Those of forces, elements, integrators, and fields on grids are in `laws.rs`; two programs keep both cores busy.
 //!
-//! `cargo test --release -p tumble-f64 --test verification hair::` runs one file of them.
+//! `cargo test --release -p tumble-verification --test verification hair::` runs one file of them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
