@@ -58,7 +58,7 @@ def swept(*words: Any, **more: Any) -> Sweep:
     return sweep(*words, **{"plots": False, **more})
 
 
-LONG: Tree = {**FLOCK, "time": {"fps": 10, "frames": 2400}}
+LONG: Tree = {**FLOCK, "time": {"fps": 10, "frames": 1200}}
 """The same, long enough for a sweep of it to be stopped on its way, however busy the machine is."""
 
 

@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use common::{column, run, show, simulation, step};
+use common::{cases, column, run, show, simulation, step};
 use std::f64::consts::PI;
 use tumble_f64::scene::Simulation;
 use tumble_interface::Engine;
@@ -74,7 +74,8 @@ fn water_lifts_a_body_by_the_weight_of_its_volume() {
     // What a joint must bear, at rest: a ball and a tilted box.
     let boxed = "shape.box = { size = [0.2, 0.16, 0.24] }\nrotate = [[30, 20, 0]]";
     let ball = format!("shape.sphere = {{ radius = {R} }}");
-    for (shape, volume, hole, most) in [(&ball[..], 4.0 / 3.0 * PI * R.powi(3), R, 0.01), (boxed, 0.2 * 0.16 * 0.24, 0.178, 0.05)] {
+    let shapes = [(&ball[..], 4.0 / 3.0 * PI * R.powi(3), R, 0.01), (boxed, 0.2 * 0.16 * 0.24, 0.178, 0.05)];
+    for (shape, volume, hole, most) in cases(shapes, 2) {
         let body = format!("{shape}\nposition = [[0, 0, 0.24]]\ndensity = 1000");
         let held = "[[joint]]\nname = \"held\"\nbetween = [\"body\"]\nat = [0, 0, 0.24]\nkind = { fixed = {} }";
         let (mut sim, _) = tank(14, &body, held, |at| in_ball(at, hole));
@@ -123,7 +124,7 @@ fn a_box_floats_as_deep_as_its_density() {
     let low = low();
     println!("the level is lower by {low}");
     let size = [0.24, 0.24, 0.16];
-    for ratio in [0.25, 0.5, 0.75] {
+    for ratio in cases([0.25, 0.5, 0.75], 2) {
         let body = format!("shape.box = {{ size = {size:?} }}\nposition = [[0, 0, 0.44]]\ndensity = {}", 1000.0 * ratio);
         let (mut sim, level) = tank(9, &body, "", |_| false);
         run(&mut sim, 48);

@@ -201,13 +201,13 @@ fn threads_snapshots_and_far_grains_change_no_bit() {
         pool.install(|| {
             let more = [BODY, more].concat();
             let mut sim = heap(0.0065, &more);
-            run(&mut sim, 12);
+            run(&mut sim, 6);
             if cut {
                 let kept = sim.save(&[]);
                 sim = heap(0.0065, &more);
                 sim.restore(&kept).unwrap();
             }
-            run(&mut sim, 12);
+            run(&mut sim, 6);
             assert!(sim.ledger().contacts.unwrap() > 1000);
             [positions(&sim, "sand"), velocities(&sim, "sand"), column(&sim, "stones", "angular_velocity"), velocities(&sim, "box")]
                 .concat()

@@ -16,7 +16,7 @@ const LINKS: &str = "links = { structural = { modulus = 100, damping = 0.02 }, s
 /// Self-contact may do what it likes with positions and velocities, but not with momentum; whatever the scheme.
 #[test]
 fn sheets_that_meet_keep_momentum_and_do_not_pass() {
-    for scheme in common::cases(common::every().into_iter().rev(), 3) {
+    for scheme in common::cases(common::every().into_iter().rev(), 5) {
         let steps = match scheme {
             Integrator::DormandPrince => "adaptive.tolerance = 1e-4",
             Integrator::AdaptiveEuler => "adaptive.tolerance = 1e-5",

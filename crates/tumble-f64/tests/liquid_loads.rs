@@ -87,7 +87,7 @@ fn water_filled_to_the_brim_stays() {
 fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
     let (spacing, size) = (0.05, [0.5, 0.5, 0.5]);
     let mut sim = simulation(&water(spacing, 0.0, size, "[[force]]\nkind = \"drag\"\nrate = 3\n"));
-    run(&mut sim, 200);
+    run(&mut sim, if common::whole() { 200 } else { 150 });
     let weight = sim.ledger().mass * 9.8;
     let (mut pressures, mut sides, mut floor, mut total) = (vec![0.0; 1000], [0.0; 4], Vector::default(), 0.0);
     for _ in 0..20 {
@@ -134,7 +134,7 @@ fn a_ball_that_is_held_under_water_feels_its_buoyancy() {
         "[[force]]\nkind = \"drag\"\nrate = 3\n[[collider]]\nname = \"ball\"\nshape.sphere = {{ center = [0, 0, 0.35], radius = {radius} }}\n"
     );
     let mut sim = simulation(&water(0.05, 0.0, [0.7, 0.7, 0.7], &more));
-    run(&mut sim, 150);
+    run(&mut sim, if common::whole() { 150 } else { 75 });
     let mut lift = Vector::default();
     for _ in 0..20 {
         step(&mut sim);

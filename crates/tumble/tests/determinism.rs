@@ -288,7 +288,7 @@ fn a_run_that_is_restored_later_goes_on_to_the_same_bits() {
 
 fn goes_on_when_restored(frames: fn(usize) -> usize) {
     let mut touching = 0;
-    for (name, text, most) in scenes() {
+    for (name, text, most) in part() {
         let frames = frames(most);
         let (first, rest) = (frames / 2, frames - frames / 2);
         let mut sim = simulation(&text);
