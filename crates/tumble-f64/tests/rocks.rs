@@ -227,3 +227,66 @@ fn rocks_among_people_give_the_same_bits_on_any_count_of_threads_and_after_a_res
     let reference = once(1, false);
     assert!(reference == once(2, false) && reference == once(8, false) && reference == once(2, true));
 }
+
+/// Ten people, one who stands at x [m] and is injured by a stone from behind, and a wall at 10 m with a gap around y = 2 m.
+fn past_the_injured(gap: f64, x: f64) -> Simulation {
+    let walls = format!("[[[20, 0], [0, 0], [0, 4], [20, 4]], [[10, 0], [10, {}]], [[10, {}], [10, 4]]]", 2.0 - 0.5 * gap, 2.0 + 0.5 * gap);
+    let floor = plan(&walls, &gate("exit", "out", [20.0, 0.0], [20.0, 4.0]));
+    let places: Vec<[f64; 2]> = (0..10).map(|i| [2.0 + 0.6 * f64::from(i % 5), 1.5 + f64::from(i / 5)]).collect();
+    let head = format!("time = {{ fps = {FPS}, frames = 100000 }}\nworld.gravity = [0, 0, 0]\n");
+    let walkers = crowd(&format!("position = {places:?}\nspeed_deviation = 0"));
+    let victim = format!("[[crowd]]\nname = \"victim\"\nposition = [[{x}, 2]]\nreaction = 1000\n");
+    simulation(&(head + &floor + &walkers + &victim + &ball(20.0, [x - 0.6, 2.0, 1.0], [5.0, 0.0, 0.0])))
+}
+
+#[test]
+fn people_step_over_the_injured_where_there_is_no_way_around() {
+    // The blow moves the injured by 0.1 m: into the gap.
+    let mut times = Vec::new();
+    for x in [9.9, 15.0] {
+        let mut sim = past_the_injured(0.8, x);
+        let mut on_top = 0;
+        while sim.ledger().people.unwrap() > 1 {
+            assert!(sim.time() < 60.0, "{:?}", positions(&sim, "people"));
+            step(&mut sim);
+            let lies = positions(&sim, "victim")[0];
+            let near = |p: &&tumble_f64::geometry::Vector| (p.x - lies.x).hypot(p.y - lies.y) < 0.3;
+            on_top += positions(&sim, "people").iter().filter(near).count();
+        }
+        assert_eq!(fallen(&sim), [0, 1]);
+        // In the gap everybody steps over; where there is room, nobody.
+        assert!(if x < 10.0 { on_top > 10 * FPS / 10 } else { on_top == 0 }, "{on_top} at {x} m");
+        times.push(sim.time());
+    }
+    assert!(times[0] > times[1] + 1.0 && times[0] < times[1] + 20.0, "{times:?}");
+}
+
+#[test]
+fn who_would_rise_waits_until_nobody_is_on_top() {
+    // Knocked down for 5 s before a gap, which forty pass.
+    let walls = "[[[20, 0], [0, 0], [0, 4], [20, 4]], [[10, 0], [10, 1.6]], [[10, 2.4], [10, 4]]]";
+    let head = format!("time = {{ fps = {FPS}, frames = 100000 }}\nworld.gravity = [0, 0, 0]\n");
+    let places: Vec<[f64; 2]> = (0..40).map(|i| [8.6 - 0.6 * f64::from(i / 5), 0.8 + 0.6 * f64::from(i % 5)]).collect();
+    let victim = "[[crowd]]\nname = \"victim\"\nposition = [[9.4, 2]]\nreaction = 1000\n";
+    let floor = plan(walls, &gate("exit", "out", [20.0, 0.0], [20.0, 4.0]));
+    let lies = |walkers: &str| {
+        let mut sim = simulation(&format!("{head}{floor}{walkers}{victim}{}", ball(200.0, [8.9, 2.0, 1.0], [1.5, 0.0, 0.0])));
+        run(&mut sim, 2 * FPS);
+        assert_eq!(fallen(&sim), [1, 0]);
+        let nearest = |sim: &Simulation, lies: tumble_f64::geometry::Vector| {
+            let others = if walkers.is_empty() { Vec::new() } else { positions(sim, "people") };
+            others.iter().map(|p| (p.x - lies.x).hypot(p.y - lies.y)).fold(f64::INFINITY, f64::min)
+        };
+        loop {
+            let before = nearest(&sim, positions(&sim, "victim")[0]);
+            step(&mut sim);
+            let after = nearest(&sim, positions(&sim, "victim")[0]);
+            if fallen(&sim)[0] == 0 {
+                return (sim.time(), before.max(after));
+            }
+            assert!(sim.time() < 5.2 || before.min(after) < 0.45, "{} {before} {after}", sim.time());
+        }
+    };
+    let (alone, trodden) = (lies(""), lies(&crowd(&format!("position = {places:?}\nspeed_deviation = 0"))));
+    assert!((5.0..5.2).contains(&alone.0) && trodden.0 > alone.0 + 1.0 && trodden.1 > 0.35, "{alone:?} {trodden:?}");
+}

@@ -49,6 +49,12 @@ impl Person {
         self.started && t >= self.up && self.out.is_none()
     }
 
+    /// Whether it steps over somebody at a distance d [m], or is about to: over who lies, and where there is no way around.
+    pub fn steps_over(&self, other: &Other, d: f64) -> bool {
+        let waits = || self.started && length(self.v) < WAITS * self.speed;
+        other.lies && !self.lies && (d < self.radius + other.radius || waits())
+    }
+
     /// Whether it is on its way, and slow.
     pub fn waits(&self) -> bool {
         self.started && length(self.v) < WAITS * self.free
@@ -75,6 +81,8 @@ pub struct Other {
     pub e: Point,
     pub v: Point,
     pub phi: f64,
+    /// Whether it lies on the floor.
+    pub lies: bool,
     pub id: u32,
     /// Its row.
     pub row: u32,

@@ -274,6 +274,7 @@ impl System for Crowd {
                 out,
                 leg: row[9] as u32,
                 way: row[10] as u32,
+                started: out.is_some() || time[0] >= row[6],
                 slide: [row[11], row[12]],
                 up: row[13],
                 lies: time[0] < row[13],

@@ -13,6 +13,9 @@ use crate::math::parallel::Tasks;
 /// People a task.
 const TASK: usize = 256;
 
+/// Of the desired speed: how fast people step over who lies.
+const OVER: f64 = 0.5;
+
 /// Memory that steps reuse.
 #[derive(Debug, Default)]
 pub struct Scratch {
@@ -56,7 +59,16 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
     sorted.chunks_mut(TASK).zip(near.order.chunks(TASK)).in_parallel(|(sorted, rows)| {
         for (other, row) in sorted.iter_mut().zip(rows) {
             let p = &all[*row as usize];
-            *other = Other { x: p.x, radius: p.radius, e: [cos(p.heading), sin(p.heading)], v: p.v, phi: p.phi, id: p.id, row: *row };
+            *other = Other {
+                x: p.x,
+                radius: p.radius,
+                e: [cos(p.heading), sin(p.heading)],
+                v: p.v,
+                phi: p.phi,
+                lies: p.lies,
+                id: p.id,
+                row: *row,
+            };
         }
     });
     let (near, sorted) = (&*near, &*sorted);
@@ -66,19 +78,26 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
         let directions: Vec<(Point, u32)> = part.iter().map(direction).collect();
         let (mut others, mut planes) = (Vec::new(), Vec::new());
         for ((to, me), direction) in own.iter_mut().zip(part).zip(directions) {
+            let person = &all[me.row as usize];
+            let mut over = false;
             others.clear();
             for run in near.runs(me.x, range) {
                 for other in &sorted[run] {
                     let r = sub(other.x, me.x);
                     let d_sq = dot(r, r);
                     if d_sq < range * range && other.id != me.id {
-                        others.push(Neighbour { r, d: d_sq.sqrt(), other });
+                        let d = d_sq.sqrt();
+                        if person.steps_over(other, d) {
+                            over |= d < person.radius + other.radius;
+                        } else {
+                            others.push(Neighbour { r, d, other });
+                        }
                     }
                 }
             }
-            let person = &all[me.row as usize];
             let (down, gate) = person.out.map_or(direction, |out| (out, NONE));
-            let speed = floor.plan.slope(me.x).map_or(person.speed, |slope| person.speed * slope.factor(down));
+            let pace = if over { OVER * person.speed } else { person.speed };
+            let speed = floor.plan.slope(me.x).map_or(pace, |slope| pace * slope.factor(down));
             let (walls, bodies) = (floor.plan.near(me.x), bodies.of(me.row));
             let around = Around { me: person, e: me.e, speed, plan: &floor.plan, walls, bodies, others: &others };
             *to = Move { gate, ..one(&around, floor.way(person.way), model, down, h, &mut planes) };

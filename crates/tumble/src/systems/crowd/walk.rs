@@ -97,6 +97,17 @@ impl Walk {
         if !gone.is_empty() {
             self.people.retain(|p| gone.binary_search(&p.id).is_err());
         }
+        if self.frailty.is_some() {
+            self.keep_down(t + h, h);
+        }
+    }
+
+    /// Who would rise at t waits until nobody is on top.
+    fn keep_down(&mut self, t: f64, h: f64) {
+        let on_top = |p: &Person, o: &Person| !o.lies && o.id != p.id && length(sub(o.x, p.x)) < p.radius + o.radius;
+        let waits = |p: &Person| p.lies && t >= p.up && self.people.iter().any(|o| on_top(p, o));
+        let waiting: Vec<usize> = (0..self.people.len()).filter(|i| waits(&self.people[*i])).collect();
+        waiting.into_iter().for_each(|i| self.people[i].up = t + h);
     }
 
     /// What a step meant to somebody: what was crossed, whether a leg of the journey ends, and the time that was lost.
@@ -168,14 +179,14 @@ impl Walk {
         self.present().filter(|p| p.phi == f64::INFINITY).count()
     }
 
-    /// The deepest overlap of two bodies, or of a body and a wall [m].
+    /// The deepest overlap of two bodies, of which none lies, or of a body and a wall [m].
     pub fn deepest(&self) -> f64 {
         let mut near = Near::default();
         let range = 2.0 * self.people.iter().map(|p| p.radius).fold(0.0, f64::max);
         near.sort(range.max(0.1), self.people.iter().map(|p| p.x));
         let deepest = |p: &Person| {
             let others = near.runs(p.x, range).flat_map(|run| &near.order[run]).map(|row| &self.people[*row as usize]);
-            let overlap = |o: &Person| if o.id == p.id { 0.0 } else { p.radius + o.radius - length(sub(o.x, p.x)) };
+            let overlap = |o: &Person| if o.id == p.id || o.lies || p.lies { 0.0 } else { p.radius + o.radius - length(sub(o.x, p.x)) };
             others.map(overlap).fold(p.radius - self.floor.plan.clearance(p.x), f64::max)
         };
         max(self.people.len(), |range| self.people[range].iter().map(deepest).fold(0.0, f64::max)).max(0.0)
