@@ -12,7 +12,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test prepare rust-tests behind lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb blender validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare rust-tests lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb blender validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -59,13 +59,9 @@ test:
 	echo "All tests passed."; \
 	awk '{ printf "%-12s %5d s\n", $$1, $$2; sum += $$2 } END { printf "%-12s %5d s\n", "all", sum }' target/seconds
 
-# Builds and downloads, side by side: none of them keeps two cores busy all the time.
+# Builds and downloads, side by side: the modules for the browser keep one core busy about as long as the Rust tests the other.
 prepare:
-	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports rust-tests behind
-
-# What can wait for the longest chain of builds: that of the Rust tests.
-behind:
-	@nice -n 15 $(MAKE) --no-print-directory -j 2 lint-rust wasm
+	@$(MAKE) --no-print-directory -j 6 debian web/node_modules/.ready $(VENV)/.imports rust-tests lint-rust wasm
 
 rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
