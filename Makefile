@@ -78,7 +78,7 @@ lint: setup lint-rust
 		else echo "no Node here: the source of the browser laboratory is not checked"; fi
 
 # Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
-RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests
+RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-wasm-f64 --exclude tumble-bindgen --release --tests
 
 # Tests tell their time only where RUSTC_BOOTSTRAP is set, as it is here when they run, not when they are built.
 TIMED := --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Zunstable-options --report-time
@@ -140,16 +140,14 @@ wasm-target:
 $(PKG)/.$(WASM_PROFILE):
 	@mkdir -p $(PKG) && rm -f $(PKG)/.web $(PKG)/.tested && touch $@
 
+# Of one build, side by side: each module compiles an engine.
 $(PKG)/single_bg.wasm: $(PKG)/.$(WASM_PROFILE) $(RUST) | wasm-target
-	$(call wasm-module,single,)
+	cargo build --quiet --profile $(WASM_PROFILE) -p tumble-wasm -p tumble-wasm-f64 --target wasm32-unknown-unknown --target-dir target/wasm
+	cargo build --quiet -p tumble-bindgen --target-dir target/wasm
+	target/wasm/debug/tumble-bindgen target/wasm/wasm32-unknown-unknown/$(WASM_PROFILE)/tumble_wasm.wasm single $(PKG)
+	target/wasm/debug/tumble-bindgen target/wasm/wasm32-unknown-unknown/$(WASM_PROFILE)/tumble_wasm_f64.wasm double $(PKG)
 
-$(PKG)/double_bg.wasm: $(PKG)/.$(WASM_PROFILE) $(RUST) | wasm-target $(PKG)/single_bg.wasm
-	$(call wasm-module,double,--features double)
-
-define wasm-module
-cargo build --quiet --profile $(WASM_PROFILE) -p tumble-wasm --target wasm32-unknown-unknown --target-dir target/wasm $(2)
-cargo run --quiet -p tumble-bindgen --target-dir target/wasm target/wasm/wasm32-unknown-unknown/$(WASM_PROFILE)/tumble_wasm.wasm $(1) $(PKG)
-endef
+$(PKG)/double_bg.wasm: $(PKG)/single_bg.wasm ;
 
 debian: openvdb chromium
 
