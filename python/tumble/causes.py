@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tumble import energy
+from tumble import energy, methods
 from tumble._engine import World
 from tumble.columns import BOUND, on_grids
 from tumble.cures import step_used, system, viscous_limit
@@ -86,11 +86,11 @@ def _mode(about: Mapping[str, Any], step: float) -> str:
 
 
 def _formulas(scene: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
-    """Formulas of what lies on a grid, and of fields that carry tracers, that may give no finite number, where steps are not
+    """Formulas of what lies on a grid, and of fields that carry points, that may give no finite number, where steps are not
     too long."""
     if report.get("kind") != "not_finite" or float(report["step"]) > float(report["stable_step"]):
         return
-    if system(scene, report)[1].get("method") == "tracers":
+    if methods.of_system(system(scene, report)[1]).is_carried:
         for i, field in enumerate(scene["field"]):
             for path, text in _texts("", field):
                 if _UNSAFE.search(text):

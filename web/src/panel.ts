@@ -1,6 +1,7 @@
 /** Controls for the values of a scene, made from its schema: label, unit, range, what the word means. */
 import { parse } from "smol-toml";
 import { check, h, show } from "./dom";
+import { METHODS } from "./engine/measures";
 import type { SceneInfo, Stability, Value } from "./engine/protocol";
 import { ofSteps, type Range, range } from "./ranges";
 import { chosen, label, told, unitOf, word } from "./texts";
@@ -46,8 +47,6 @@ const TELLING: Record<string, string[]> = {
   "field.sink": ["rate"],
   "field.uniform": ["velocity"],
 };
-/** Methods that can move the same objects. */
-const ALIKE = ["dynamics", "position_based", "tracers"];
 
 /** The method in force: `position_based` stands under either key. */
 const methodOf = ({ method, integrator }: Tree): string => (method === "dynamics" && integrator === "position_based" ? integrator : method);
@@ -56,22 +55,17 @@ const methodOf = ({ method, integrator }: Tree): string => (method === "dynamics
 function inForce(key: string, system: Tree): boolean {
   const { integrator } = system;
   const method = methodOf(system);
-  const masses = method === "dynamics" || method === "position_based";
   const positions = method === "position_based";
-  const stepped = method === "dynamics" || method === "tracers";
+  const { masses } = METHODS[method];
+  const stepped = METHODS[method].stepped && !positions;
   const rules: Record<string, boolean> = {
     integrator: stepped,
     adaptive: stepped && ["adaptive_euler", "dormand_prince"].includes(integrator),
     solver: stepped && ["implicit_euler", "implicit_midpoint", "bdf2"].includes(integrator),
     clamp: positions || (stepped && ["modified_euler", "verlet"].includes(integrator)),
-    position_based: positions,
     self_contact: masses,
-    vicsek: method === "vicsek",
-    rigid: method === "rigid",
-    grains: method === "grains",
-    crowd: method === "crowd",
   };
-  return rules[key] ?? true;
+  return rules[key] ?? (!(key in METHODS) || key === method);
 }
 
 /** So many of them, at most, so that the rest stays in sight. */
@@ -258,10 +252,10 @@ export class Panel {
       list.forEach((entry, i) => take(table, `${table}.${i}`, entry, items));
     }
     const systems = resolve(resolve(this.schema.properties.system, this.schema).items, this.schema);
-    (scene.system as Tree[]).forEach(
-      (s, i) =>
-        s.vicsek && entries.push(["system.vicsek", `system.${i}.vicsek`, s.vicsek, resolve(systems.properties.vicsek, this.schema)]),
-    );
+    for (const [i, s] of (scene.system as Tree[]).entries()) {
+      const own = s[s.method] as Tree | null;
+      if (own) entries.push([`system.${s.method}`, `system.${i}.${s.method}`, own, resolve(systems.properties[s.method], this.schema)]);
+    }
     const sets: HTMLElement[] = [];
     for (const [kind, path, entry, schema] of entries) {
       const own = schema.properties ? schema : branch(schema, entry, this.schema);
@@ -479,7 +473,7 @@ export class Panel {
     const method = /^system\.\d+\.method$/.test(path);
     const may = (v: string) =>
       method
-        ? v === value || (ALIKE.includes(v) && ALIKE.includes(value))
+        ? v === value || (METHODS[v]?.stepped && METHODS[value]?.stepped)
         : v === value || !/^system\.\d+\.integrator$/.test(path) || v !== "position_based";
     const branches = ((schema.oneOf ?? schema.anyOf) as Schema[])
       .flatMap((b): [string, string][] =>

@@ -1,6 +1,7 @@
 /** The theory beside each page: equations by their tags, where they are explained, and the files that implement them. */
 import sources from "virtual:sources";
 import { h } from "./dom";
+import { METHODS } from "./engine/measures";
 import type { SceneInfo } from "./engine/protocol";
 import { theoryText } from "./scenes";
 
@@ -50,17 +51,10 @@ export function topics(info: SceneInfo): Topic[] {
   const found: Topic[] = [];
   const scene = info.scene as Record<string, any>;
   const has = (kind: string) => info.objects.some((o) => o.kind === kind);
-  if (has("gas")) found.push({ page: "gas", tags: ["gas.1", "gas.3", "gas.4", "gas.5"] }, { page: "pressure", tags: ["pressure.1"] });
+  for (const { method } of info.systems) for (const [page, tags] of METHODS[method].theory) found.push({ page, tags });
   if ((scene.gas ?? []).some((g: any) => g.fire)) found.push({ page: "fire", tags: ["fire.1"] });
-  if (has("heat")) found.push({ page: "heat", tags: ["heat.1"] });
-  if (has("compressible")) found.push({ page: "compressible", tags: ["compressible.1"] });
-  if (has("body")) found.push({ page: "rigid", tags: ["rigid.1", "rigid.4"] });
   if ((scene.body ?? []).some((b: any) => b.fracture)) found.push({ page: "fracture", tags: ["fracture.1"] });
   if (has("joint")) found.push({ page: "joints", tags: ["joints.1", "joints.2"] });
-  if (has("crowd")) found.push({ page: "crowds", tags: ["crowds.4", "crowds.7"] });
-  if (has("liquid")) found.push({ page: "pic", tags: ["pic.0", "pic.1", "pic.3", "pic.6"] }, { page: "pressure", tags: ["pressure.1"] });
-  if (has("grains")) found.push({ page: "grains", tags: ["grains.1", "grains.2"] });
-  if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
   for (const force of [...(scene.force ?? []), ...(scene.field ?? [])])
     if (FORCES[force.kind] && force.kind !== "drag") found.push(FORCES[force.kind]);
   if ((scene.rope ?? []).some((r: any) => r.rod)) found.push({ page: "rods", tags: ["rods.1"] });
@@ -75,7 +69,7 @@ export function topics(info: SceneInfo): Topic[] {
   // Almost every scene has some drag; none is about it.
   if ((scene.force ?? []).some((f: any) => f.kind === "drag")) found.push(FORCES.drag);
   if (has("emitter")) found.push({ page: "particles", tags: ["particles.2"] });
-  const schemes = [...new Set(info.systems.filter((s) => ["dynamics", "tracers"].includes(s.method)).map((s) => s.integrator))];
+  const schemes = [...new Set(info.systems.filter((s) => METHODS[s.method].stepped).map((s) => s.integrator))];
   if (schemes.length) found.push({ page: "integrators", tags: schemes.map((s) => `integrators.${SCHEMES[s] ?? "1"}`) });
   const pages = new Map<string, Topic>();
   for (const t of found) {

@@ -36,7 +36,9 @@ mod _engine {
     /// What the engine says of its numbers, each described once; see `tumble.measures`.
     #[pyfunction]
     fn tables(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
-        Ok(pythonize::pythonize(py, &tumble_interface::measures::tables())?)
+        let mut tables = tumble_interface::measures::tables();
+        tables["methods"] = serde_json::json!(tumble::scene::facts());
+        Ok(pythonize::pythonize(py, &tables)?)
     }
 
     #[pymodule_init]

@@ -333,7 +333,7 @@ fn the_test_sees_circles() {
 
 /// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and
 /// lab, and tests: lines of each file, and why.
-const PLACES: [(&str, usize, &str); 11] = [
+const COMPRESSIBLE: [(&str, usize, &str); 10] = [
     ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
     ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
     ("crates/tumble-interface/src/scene/mod.rs", 4, "declares the module; the table of a scene"),
@@ -343,17 +343,28 @@ const PLACES: [(&str, usize, &str); 11] = [
     ("crates/tumble-interface/src/columns.rs", 1, "the table of columns"),
     ("python/tumble/cli/lab.py", 5, "the command of its lab page"),
     ("python/tumble/cures.py", 3, "cures of its own"),
-    ("web/src/engine/measures.ts", 1, "generated from the table of kinds"),
-    ("web/src/theory.ts", 1, "the page of its equations"),
+    ("web/src/engine/measures.ts", 2, "generated from the tables of kinds and of methods"),
+];
+const VICSEK: [(&str, usize, &str); 8] = [
+    ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
+    ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
+    ("crates/tumble-interface/src/scene/mod.rs", 2, "declares the module"),
+    ("crates/tumble-interface/src/scene/systems.rs", 7, "the word of the method; the table of its settings"),
+    ("python/tumble/cli/sweep.py", 1, "an example"),
+    ("web/src/engine/measures.ts", 1, "generated from the table of methods"),
+    ("web/src/panel.ts", 1, "its most telling words"),
+    ("web/src/texts.ts", 2, "its words, for people"),
 ];
 
-/// What belongs to the method.
-const OWN: [&str; 4] = [
-    "crates/tumble/src/systems/compressible.rs",
-    "crates/tumble/src/scene/methods/compressible.rs",
-    "crates/tumble-interface/src/scene/compressible.rs",
-    "python/tumble/lab/compressible.py",
-];
+/// The files that belong to a method.
+fn own(method: &str) -> [String; 4] {
+    [
+        format!("crates/tumble/src/systems/{method}.rs"),
+        format!("crates/tumble/src/scene/methods/{method}.rs"),
+        format!("crates/tumble-interface/src/scene/{method}.rs"),
+        format!("python/tumble/lab/{method}.py"),
+    ]
+}
 
 /// Lines of code and comments in which a word stands, without citations of equations such as (compressible.3).
 fn lines_with(word: &str, text: &str) -> usize {
@@ -387,21 +398,24 @@ fn a_method_is_named_in_few_places() {
     let folders = crates.filter(|f| !f.is_symlink()).chain(["python/tumble", "web/src"].map(|f| root.join(f)));
     let mut found = Vec::new();
     folders.filter(|f| f.is_dir()).for_each(|folder| texts(&folder, &mut found));
-    let (mut total, mut wrong) = (0, Vec::new());
-    for path in found {
-        let name = path.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/");
-        if OWN.contains(&name.as_str()) {
-            continue;
+    let mut wrong = Vec::new();
+    for (method, places) in [("compressible", &COMPRESSIBLE[..]), ("vicsek", &VICSEK[..])] {
+        let (own, mut total) = (own(method), 0);
+        for path in &found {
+            let name = path.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/");
+            if own.contains(&name) {
+                continue;
+            }
+            let n = lines_with(method, &fs::read_to_string(path).unwrap());
+            let allowed = places.iter().find(|p| p.0 == name).map_or(0, |p| p.1);
+            total += n;
+            if n > allowed {
+                wrong.push(format!("{name}: {n} lines with {method}, expected {allowed} at most"));
+            }
         }
-        let n = lines_with("compressible", &fs::read_to_string(&path).unwrap());
-        let allowed = PLACES.iter().find(|p| p.0 == name).map_or(0, |p| p.1);
-        total += n;
-        if n > allowed {
-            wrong.push(format!("{name}: {n} lines, expected {allowed} at most"));
-        }
+        println!("{method}: {total} places");
+        assert!(total >= 9, "the test sees no places");
     }
-    println!("{total} places");
-    assert!(total >= 9, "the test sees no places");
     assert!(wrong.is_empty(), "a method is named outside its own files:\n{}", wrong.join("\n"));
     assert_eq!(lines_with("heat", "heat::Heat\nheated\n(heat.3) x\nHEAT, preheat\n// of heat."), 3);
 }

@@ -271,6 +271,8 @@ def _holds(expected: "Forecast", duration: float) -> str:
 
 
 def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str:
+    from tumble import methods
+
     tree = scene.to_dict()
     span = tree["time"]
     lines = [
@@ -284,17 +286,17 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
     for name, table in topology.items():
         if name in born:
             continue
-        loose = (("grains", "grain"), ("liquid", "particle"))
-        word = next((word for kind, word in loose if any(thing["name"] == name for thing in tree[kind])), "mass")
-        own = words | {"mass": "rigid body" if "vertices" in table else word}
+        method = methods.of_object(tree, name)
+        noun = method.noun if method else "mass"
+        own = words | {"mass": "rigid body" if "vertices" in table else noun}
         parts = [counted(len(table[key]), word) for key, word in own.items() if key in table]
         if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
-            word = "particle" if _is_of(tree, name, "vicsek") else "tracer"
-            parts.insert(0, counted(len(positions[name]["position"]), word))
+            parts.insert(0, counted(len(positions[name]["position"]), noun))
         lines.append(f'{"collider" if name in solid else "object":10} "{name}": {", ".join(parts) or "no mesh"}')
     duration = span["frames"] / span["fps"]
     for f in expected:
-        kind = " (tracers)" if _is_of(tree, f.name, "tracers") else ""
+        method = methods.of_object(tree, f.name)
+        kind = f" ({method.noun}s)" if method and method.is_carried else ""
         lines.append(f'emitter    "{f.name}"{kind}: {_holds(f, duration)}')
     for anchor in tree["anchor"]:
         lines.append(f'anchor     "{anchor["name"]}": from {" to ".join(anchor["between"])}')
@@ -327,12 +329,6 @@ def _disk(world: "World", expected: "list[Forecast]", frames: int, fps: float) -
         return f"a frame takes {'up to ' if born else ''}{size(sizes.max())} on disk, the run {size(sizes.sum())}"
     blind = ", ".join(f'"{f.name}"' for f in expected if not f.known)
     return f"a frame takes {size(sizes.max())} on disk, the run {size(sizes.sum())}, without {blind}"
-
-
-def _is_of(tree: dict[str, Any], name: str, method: str) -> bool:
-    """Whether a system of this method moves an object."""
-    systems = {t["system"] for kind in ("particles", "emitter") for t in tree[kind] if t["name"] == name}
-    return any(s["name"] in systems and s["method"] == method for s in tree["system"])
 
 
 def _memory() -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tumble import methods
 from tumble._engine import Scene, SceneError, World
 from tumble.columns import on_grids
 from tumble.lab import exact
@@ -114,7 +115,8 @@ class Subject:
         systems = []
         for system in self.tree["system"]:
             own = dict(system)
-            if own["method"] == ("tracers" if self.massless else "dynamics"):
+            method = methods.of_system(own)
+            if method.own_scheme is None and method.is_carried == self.massless:
                 own |= {"integrator": scheme.word, "substeps": substeps, "step": None}
                 if scheme.adaptive:
                     own |= {
@@ -183,23 +185,15 @@ _INSTEAD = {
 
 def _refuse(tree: Tree) -> None:
     """Refuses what has no integrators to compare, and says what to look at instead."""
-    methods = {system["method"] for system in tree["system"]}
     title = f"“{tree['title']}”" if tree["title"] else "this scene"
-    if "vicsek" in methods:
-        raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
-    for kind, things in [("body", "rigid bodies"), ("grains", "grains")]:
-        if not tree[kind]:
-            continue
-        raise SceneError(
-            f"{title} has {things}, which have a scheme of their own and no integrator; there is nothing to compare. "
-            "`tumble refine` shows how a scene converges"
-        )
     for kind, thing in on_grids(tree):
         instead = _INSTEAD.get(kind, f"see `tumble lab {kind}`")
         raise SceneError(
             f'{title} has {kind} "{thing["name"]}", which is stepped by a scheme of its own: the lab compares the integrators '
             f"of masses and tracers, and takes scenes of nothing else; {instead}"
         )
+    if why := next(filter(None, (methods.of_system(system).own_scheme for system in tree["system"])), None):
+        raise SceneError(f"{title}: {why}; there is nothing to compare. `tumble refine` shows how a scene converges")
     if liquid := next((thing["name"] for thing in tree["particles"] if thing.get("fluid")), None):
         raise SceneError(
             f'{title} has a liquid, particles "{liquid}", which position-based dynamics alone can move: no other integrator is '
@@ -221,10 +215,10 @@ def subject(scene: Scene, patience: float = np.inf) -> Subject:
     tree["precision"] = "double"
     tree["output"] = {"columns": ["position"], "plot": False}
     tree["expect"] = {}
-    methods = {system["method"] for system in tree["system"]}
-    massless = "tracers" in methods and "dynamics" not in methods
+    stepped = {methods.of_system(system).is_carried for system in tree["system"]}
+    massless = stepped == {True}
     notes = _thin(tree)
-    if {"tracers", "dynamics"} <= methods:
+    if stepped == {True, False}:
         notes.append("Tracers move as the scene says; what is compared here are the masses.")
     if any(system.get("clamp") for system in tree["system"]):
         notes.append(

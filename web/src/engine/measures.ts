@@ -3,6 +3,28 @@
 /** The kinds of objects that a scene can hold, as its tables are called. */
 export type ObjectKind = "particles" | "emitter" | "rope" | "hair" | "sheet" | "block" | "net" | "cloth" | "galaxy" | "body" | "joint" | "grains" | "plan" | "crowd" | "liquid" | "heat" | "compressible" | "gas" | "collider";
 
+/** What the page knows of a method: see python/tumble/methods.py. */
+export interface Method {
+  stepped: boolean;
+  masses: boolean;
+  theory: [string, string[]][];
+}
+
+/** Methods by their words. */
+export const METHODS: Record<string, Method> = {
+  dynamics: { stepped: true, masses: true, theory: [] },
+  position_based: { stepped: true, masses: true, theory: [] },
+  tracers: { stepped: true, masses: false, theory: [] },
+  vicsek: { stepped: false, masses: false, theory: [["flocks", ["flocks.1"]]] },
+  rigid: { stepped: false, masses: false, theory: [["rigid", ["rigid.1", "rigid.4"]]] },
+  grains: { stepped: false, masses: false, theory: [["grains", ["grains.1", "grains.2"]]] },
+  gas: { stepped: false, masses: false, theory: [["gas", ["gas.1", "gas.3", "gas.4", "gas.5"]], ["pressure", ["pressure.1"]]] },
+  liquid: { stepped: false, masses: false, theory: [["pic", ["pic.0", "pic.1", "pic.3", "pic.6"]], ["pressure", ["pressure.1"]]] },
+  heat: { stepped: false, masses: false, theory: [["heat", ["heat.1"]]] },
+  compressible: { stepped: false, masses: false, theory: [["compressible", ["compressible.1"]]] },
+  crowd: { stepped: false, masses: false, theory: [["crowds", ["crowds.4", "crowds.7"]]] },
+};
+
 /** The books of the world at one time; `null`: nothing here measures it. */
 export interface Ledger {
   /** Simulated time [s]. */

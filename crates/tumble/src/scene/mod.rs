@@ -22,7 +22,7 @@ mod simulation;
 pub use camera::{Camera, Sight};
 pub use looks::looks;
 pub use memory::memory;
-pub use methods::resolve;
+pub use methods::{facts, resolve};
 pub use overrides::{set, set_text};
 pub use simulation::Simulation;
 pub use tumble_interface::Assets;

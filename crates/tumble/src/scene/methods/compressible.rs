@@ -12,7 +12,7 @@ use crate::system::System;
 use crate::systems::compressible::{Compressible, Fluid, Gas, Settings};
 use tumble_interface::Issue;
 use tumble_interface::looks::{Colors, Look};
-use tumble_interface::scene::{Compressible as Words, Integrator, Method, Scene, System as Plan};
+use tumble_interface::scene::{Compressible as Words, Method, Scene, System as Plan};
 
 /// Bytes for a cell, density and three components of velocity in all that a step keeps of them: measured, 44 numbers in either precision.
 const CELL: f64 = 46.0 * size_of::<Real>() as f64;
@@ -36,8 +36,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "a compressible gas is stepped by symplectic_euler; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("a compressible gas is stepped by symplectic_euler")
+    }
+
+    fn noun(&self) -> &'static str {
+        "cell"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("compressible", &["compressible.1"])]
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {

@@ -21,8 +21,8 @@ use std::sync::Arc;
 use tumble_interface::check::{plain, suggestion};
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
-    Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method,
-    Order, PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature, Viscous,
+    Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Method, Order,
+    PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature, Viscous,
 };
 use tumble_interface::{Issue, Warning};
 
@@ -61,8 +61,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "Stable Fluids have no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("Stable Fluids have no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "cell"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("gas", &["gas.1", "gas.3", "gas.4", "gas.5"]), ("pressure", &["pressure.1"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {

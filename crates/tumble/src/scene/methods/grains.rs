@@ -11,7 +11,7 @@ use crate::systems::grains::{Clump, Clumps, Grains as Bed, Material, Object, Ove
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{GrainFill, GrainScheme, Grains, Integrator, MeshFile, Method, NormalLaw, Scene, Shape, System as Plan};
+use tumble_interface::scene::{GrainFill, GrainScheme, Grains, MeshFile, Method, NormalLaw, Scene, Shape, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -86,8 +86,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "grains have a scheme of their own and no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("grains have a scheme of their own and no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "grain"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("grains", &["grains.1", "grains.2"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {

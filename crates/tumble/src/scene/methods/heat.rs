@@ -17,7 +17,7 @@ use crate::systems::heat::{Boundary, Heat, HeatedBody, Material, Plan, SAFE, Set
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
-    Animated, Component, Heat as Words, HeatScheme, HeatSide, Integrator, Method, Scene, Shape as Solid, System as Stepping,
+    Animated, Component, Heat as Words, HeatScheme, HeatSide, Method, Scene, Shape as Solid, System as Stepping,
 };
 use tumble_interface::{Issue, Warning};
 
@@ -43,9 +43,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        let message = || "each [[heat]] body has a scheme of its own, and the system no integrator; leave it out".into();
-        (integrator != Integrator::default()).then(message)
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("each [[heat]] body has a scheme of its own, and the system no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "cell"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("heat", &["heat.1"])]
     }
 
     fn hints(&self, scene: &Scene) -> Vec<Warning> {

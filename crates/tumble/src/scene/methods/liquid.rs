@@ -19,9 +19,7 @@ use crate::systems::liquid::{Accuracy, Inflow, Liquid as Tanks, Openings, Partic
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{
-    AnimatedVector, Integrator, Liquid, LiquidFill, LiquidTransfer, MeshFile, Method, Scene, Shape, Solid, System as Plan,
-};
+use tumble_interface::scene::{AnimatedVector, Liquid, LiquidFill, LiquidTransfer, MeshFile, Method, Scene, Shape, Solid, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -68,8 +66,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "liquids on a grid have a scheme of their own and no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("liquids on a grid have a scheme of their own and no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "particle"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("pic", &["pic.0", "pic.1", "pic.3", "pic.6"]), ("pressure", &["pressure.1"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {

@@ -20,6 +20,7 @@ use super::laws::flat;
 use crate::math::formula::Of;
 use crate::math::{Signal, VectorSignal};
 use crate::system::System;
+use serde::Serialize;
 use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
 use tumble_interface::scene::{Emitter, Integrator, Method, Object, Particles, Scene, System as Plan};
 use tumble_interface::{Issue, Warning};
@@ -83,9 +84,24 @@ pub trait MethodRules: Sync {
         false
     }
 
-    /// Why it cannot be stepped by an integrator; `None` if it can.
-    fn refusal(&self, _integrator: Integrator) -> Option<String> {
+    /// The word for one of its points.
+    fn noun(&self) -> &'static str {
+        "mass"
+    }
+
+    /// Why integrators do not step it; `None` if they do.
+    fn own_scheme(&self) -> Option<&'static str> {
         None
+    }
+
+    /// Why an integrator cannot step it; `None` if it can.
+    fn refusal(&self, integrator: Integrator) -> Option<String> {
+        self.own_scheme().filter(|_| integrator != Integrator::default()).map(|why| format!("{why}; leave it out"))
+    }
+
+    /// Pages of theory that its objects are on, with the equations shown first.
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[]
     }
 
     /// What is wrong with its words, before anything is built.
@@ -107,6 +123,36 @@ pub trait MethodRules: Sync {
 
     /// Builds a system; what is wrong with its objects goes to the builder's issues.
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>>;
+}
+
+/// What fronts know of a method.
+#[derive(Debug, Serialize)]
+pub struct Facts {
+    /// Its words in scenes, the main one first.
+    pub words: Vec<&'static str>,
+    /// Kinds of objects that it can move.
+    pub kinds: &'static [&'static str],
+    /// The word for one of its points.
+    pub noun: &'static str,
+    /// Why integrators do not step it; none if they do.
+    pub own_scheme: Option<&'static str>,
+    /// Whether forces move its points.
+    pub has_masses: bool,
+    /// Pages of theory, with the equations shown first.
+    pub theory: &'static [(&'static str, &'static [&'static str])],
+}
+
+/// What fronts know of the methods.
+pub fn facts() -> Vec<Facts> {
+    let of = |m: &'static dyn MethodRules| Facts {
+        words: m.words().iter().map(|word| word.name()).collect(),
+        kinds: m.kinds(),
+        noun: m.noun(),
+        own_scheme: m.own_scheme(),
+        has_masses: m.massless().is_none(),
+        theory: m.theory(),
+    };
+    METHODS.into_iter().map(of).collect()
 }
 
 /// The rules of a method.

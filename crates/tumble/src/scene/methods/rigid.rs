@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look, SOLID};
-use tumble_interface::scene::{Body, Integrator, MeshFile, Method, Scene, System as Plan};
+use tumble_interface::scene::{Body, MeshFile, Method, Scene, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -41,8 +41,16 @@ impl MethodRules for Rules {
         true
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "rigid bodies have a scheme of their own and no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("rigid bodies have a scheme of their own and no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "rigid body"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("rigid", &["rigid.1", "rigid.4"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {

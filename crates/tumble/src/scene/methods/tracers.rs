@@ -32,6 +32,10 @@ impl MethodRules for Rules {
         Some("tracers")
     }
 
+    fn noun(&self) -> &'static str {
+        "tracer"
+    }
+
     fn refusal(&self, integrator: Integrator) -> Option<String> {
         let known: Vec<&str> = Integrator::ALL.into_iter().filter(|i| !i.needs_velocities()).map(Integrator::name).collect();
         let message = || format!("{} needs velocities, and tracers have none; expected one of {}", integrator.name(), known.join(", "));

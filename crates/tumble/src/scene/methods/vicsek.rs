@@ -9,7 +9,7 @@ use crate::system::System;
 use crate::systems::vicsek::Swarm;
 use tumble_interface::Issue;
 use tumble_interface::looks::{Colors, Look};
-use tumble_interface::scene::{Integrator, Method, Particles, Plane, Scene, System as Plan};
+use tumble_interface::scene::{Method, Particles, Plane, Scene, System as Plan};
 
 pub struct Rules;
 
@@ -26,8 +26,16 @@ impl MethodRules for Rules {
         Some("particles of a vicsek system")
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "the model of Vicsek is a map and has no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("the model of Vicsek is a map and has no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "particle"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("flocks", &["flocks.1"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {

@@ -16,8 +16,7 @@ use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
 use tumble_interface::scene::{
-    Choice, Crowd, Gate as Words, Integrator, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners,
-    floor,
+    Choice, Crowd, Gate as Words, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners, floor,
 };
 use tumble_interface::{Issue, Warning};
 
@@ -326,8 +325,16 @@ impl MethodRules for Rules {
         Some("people")
     }
 
-    fn refusal(&self, integrator: Integrator) -> Option<String> {
-        (integrator != Integrator::default()).then(|| "people have a scheme of their own and no integrator; leave it out".into())
+    fn own_scheme(&self) -> Option<&'static str> {
+        Some("people have a scheme of their own and no integrator")
+    }
+
+    fn noun(&self) -> &'static str {
+        "person"
+    }
+
+    fn theory(&self) -> &'static [(&'static str, &'static [&'static str])] {
+        &[("crowds", &["crowds.4", "crowds.7"])]
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
