@@ -467,6 +467,29 @@ def test_default_systems_have_the_cures_of_written_ones(tmp_path: Path) -> None:
     assert left_out == written
 
 
+@pytest.mark.parametrize(
+    ("method", "things"),
+    [
+        ("rigid", {"body": [{"name": "b", "shape": {"box": {"size": [1, 1, 1]}}, "density": 1000}]}),
+        ("liquid", {"liquid": [{"name": "l", "box": BOX, "fill": [{"shape": {"box": {"size": [0.5, 0.5, 0.5]}}}]}]}),
+        ("dynamics", {"particles": [{"name": "p", "position": [[0, 0, 0]]}]}),
+    ],
+)
+def test_gravity_that_is_infinite_between_frames_is_named_and_shorter_steps_are_tried(
+    method: str, things: Tree, tmp_path: Path
+) -> None:
+    formula = "1/max(0, abs(t-0.3125)-0.01)"
+    system = [{"name": "s", "method": method, "substeps": 10}]
+    world = {"gravity": [formula, 0, -9.81]}
+    scene = {"version": 1, "time": {"fps": 24, "frames": 9}, "world": world, "system": system, **things}
+    failure = failed({**scene, "output": {"plot": False}}, tmp_path / "run")
+    # A projection that fails names its cell.
+    if method != "liquid":
+        assert any(formula in cause and "gravity" in cause for cause in failure["causes"]), failure["causes"]
+    # The engine knows no limit of these.
+    assert any(cure["set"].startswith("system.0.substeps=") for cure in failure["cures"])
+
+
 def test_formulas_of_heat_are_named_and_too_large_numbers_cured(tmp_path: Path) -> None:
     failure = failed(CASES["heat"], tmp_path / "pole")
     assert failure["causes"][0].startswith('heat "h".source[1].power = "1e6/(t-25)" ')

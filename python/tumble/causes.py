@@ -86,10 +86,13 @@ def _mode(about: Mapping[str, Any], step: float) -> str:
 
 
 def _formulas(scene: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
-    """Formulas of what lies on a grid, and of fields that carry points, that may give no finite number, where steps are not
-    too long."""
+    """Formulas of gravity, of what lies on a grid, and of fields that carry points, that may give no finite number, where
+    steps are not too long."""
     if report.get("kind") != "not_finite" or float(report["step"]) > float(report["stable_step"]):
         return
+    for path, text in _texts("", scene["world"]["gravity"]):
+        if _UNSAFE.search(text):
+            yield f'world.gravity{path} = "{text}" may give no finite number between frames'
     if methods.of_system(system(scene, report)[1]).is_carried:
         for i, field in enumerate(scene["field"]):
             for path, text in _texts("", field):
