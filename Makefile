@@ -59,9 +59,11 @@ test:
 	echo "All tests passed."; \
 	awk '{ printf "%-12s %5d s\n", $$1, $$2; sum += $$2 } END { printf "%-12s %5d s\n", "all", sum }' target/seconds
 
-# Builds and downloads, side by side: the modules for the browser keep one core busy about as long as the Rust tests the other.
+# Downloads beside the first build, and one build after the other: each keeps two cores busy with two engines, and four compilers of
+# engines at a time take a third longer and twice the memory.
 prepare:
-	@$(MAKE) --no-print-directory -j 6 debian web/node_modules/.ready $(VENV)/.imports rust-tests lint-rust wasm
+	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports lint-rust wasm
+	@$(MAKE) --no-print-directory rust-tests
 
 rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
