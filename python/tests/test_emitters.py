@@ -250,3 +250,13 @@ def test_speed_and_cone_are_those_of_the_time_of_birth() -> None:
     assert angle[born > 0.9].max() > 50
     with pytest.raises(SceneError, match=r"cone: .* at t = .*, expected 0 to 180"):
         World(Scene({**tree, "emitter": [{**tree["emitter"][0], "cone": {"keys": [[0, 0], [0.5, 200]]}}]}))  # type: ignore[index,dict-item]
+
+
+def test_check_has_the_words_of_each_method(tumble: Command) -> None:
+    for scene, words in (
+        ("crowd/office", '"floor": 98 corners'),
+        ("grains/hopper", '"gravel": 2280 grains'),
+        ("liquid/dam", '"water": 14080 particles'),
+        ("vicsek", '"walkers": 300 particles'),
+    ):
+        assert words in tumble("check", scene).out

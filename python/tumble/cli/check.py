@@ -288,6 +288,8 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
             continue
         method = methods.of_object(tree, name)
         noun = method.noun if method else "mass"
+        if any(plan["name"] == name for plan in tree["plan"]):
+            noun = "corner"
         own = words | {"mass": "rigid body" if "vertices" in table else noun}
         parts = [counted(len(table[key]), word) for key, word in own.items() if key in table]
         if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
