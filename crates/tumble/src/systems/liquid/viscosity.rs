@@ -10,8 +10,9 @@
 use super::level::{Level, cell, share};
 use crate::fluids::Solids;
 use crate::math::Real;
-use crate::math::parallel::{chunks, fold};
+use crate::math::parallel::{self, CHUNK, Tasks, chunks};
 use crate::state::{Grid, Place, Vectors};
+use std::ops::Range;
 use tumble_interface::engine::StepReport;
 
 /// Residual over velocity at which conjugate gradients stop.
@@ -37,6 +38,8 @@ pub struct Viscosity {
     edges: Faces,
     /// Inverse of the diagonal; 0 where the velocity is given.
     inverse: Faces,
+    /// Where faces are free: numbers in a row, by chunks.
+    runs: [Vec<Vec<Range<usize>>>; 3],
 }
 
 impl Viscosity {
@@ -52,6 +55,7 @@ impl Viscosity {
             cells: vec![0.0; len],
             edges: [0, 1, 2].map(|axis| vec![0.0; if grid.axes().filter(|a| *a != axis).count() == 2 { len } else { 0 }]),
             inverse: [0, 1, 2].map(|axis| vec![0.0; own(axis)]),
+            runs: Default::default(),
         };
         // The share of liquid in what a solid leaves of a cell; none where it leaves nothing, or beyond the box.
         let dry = |at: usize| level.cells[at] == cell::OUTSIDE || solids.is_some_and(|solids| solids.middle(at) <= 0.0);
@@ -96,12 +100,16 @@ impl Viscosity {
             });
         }
         this.weigh(level, &closed);
+        this.runs = this.inverse.each_ref().map(|free| {
+            let chunks = free.chunks(CHUNK).enumerate();
+            chunks.map_in_parallel(|(i, free)| runs(free).map(|run| i * CHUNK + run.start..i * CHUNK + run.end).collect())
+        });
         this
     }
 
     /// The diagonal, and which faces are free: those beside liquid.
     fn weigh(&mut self, level: &Level, closed: &(dyn Fn(usize, usize) -> bool + Sync)) {
-        let Self { grid, mass, cells, edges, inverse } = self;
+        let Self { grid, mass, cells, edges, inverse, .. } = self;
         let (lattice, stride) = (grid.lattice(), grid.lattice().stride);
         for axis in grid.axes() {
             let points = grid.points(Place::Face(axis));
@@ -129,39 +137,49 @@ impl Viscosity {
         }
     }
 
-    /// One row of the matrix times x.
-    #[inline(always)]
-    fn times(&self, x: &Faces, axis: usize, at: usize) -> Real {
+    /// Rows of the matrix times x.
+    fn times(&self, x: &Faces, out: &mut Faces) {
         let stride = self.grid.lattice().stride;
-        let (own, step) = (&x[axis], stride[axis]);
-        let upper = self.cells[at] * (own[at + step] - own[at]);
-        let lower = self.cells[at - step] * (own[at] - own[at - step]);
-        let mut sum = self.mass[axis][at] * own[at] - (upper - lower);
-        for b in self.grid.axes().filter(|b| *b != axis) {
-            let (edges, other, across) = (&self.edges[3 - axis - b], &x[b], stride[b]);
-            let shear = |at: usize| edges[at] * (own[at] - own[at - across] + other[at] - other[at - step]);
-            sum -= shear(at + across) - shear(at);
-        }
-        sum
-    }
-
-    /// Calls `f(axis, number)` for each free face, and puts what it returns there.
-    fn each(&self, out: &mut Faces, f: impl Fn(usize, usize) -> Real + Sync) {
         for axis in self.grid.axes() {
-            let free = &self.inverse[axis];
-            chunks(&mut out[axis], |start, out| {
-                for (i, out) in out.iter_mut().enumerate() {
-                    if free[start + i] > 0.0 {
-                        *out = f(axis, start + i);
-                    }
+            let (own, step, cells, mass) = (&x[axis], stride[axis], &self.cells, &self.mass[axis]);
+            let others: Vec<_> = self.grid.axes().filter(|b| *b != axis).map(|b| (&self.edges[3 - axis - b], &x[b], stride[b])).collect();
+            self.along(axis, &mut out[axis], |at, _| {
+                let upper = cells[at] * (own[at + step] - own[at]);
+                let lower = cells[at - step] * (own[at] - own[at - step]);
+                let mut sum = mass[at] * own[at] - (upper - lower);
+                for (edges, other, across) in &others {
+                    let shear = |at: usize| edges[at] * (own[at] - own[at - across] + other[at] - other[at - step]);
+                    sum -= shear(at + across) - shear(at);
                 }
+                sum
             });
         }
     }
 
-    /// a . b over the faces, in a fixed order.
+    /// Puts `f(number, value)` at each free face of an axis.
+    fn along(&self, axis: usize, out: &mut [Real], f: impl Fn(usize, Real) -> Real + Sync) {
+        chunks(out, |start, out| {
+            for run in &self.runs[axis][start / CHUNK] {
+                let own = &mut out[run.start - start..run.end - start];
+                own.iter_mut().zip(run.clone()).for_each(|(out, at)| *out = f(at, *out));
+            }
+        });
+    }
+
+    /// Puts `f(axis, number, value)` at each free face.
+    fn each(&self, out: &mut Faces, f: impl Fn(usize, usize, Real) -> Real + Sync) {
+        self.grid.axes().for_each(|axis| self.along(axis, &mut out[axis], |at, old| f(axis, at, old)));
+    }
+
+    /// a . b over the free faces, in a fixed order.
     fn dot(&self, a: &Faces, b: &Faces) -> f64 {
-        let of = |axis: usize| fold(a[axis].len(), |range| range.map(|i| f64::from(a[axis][i]) * f64::from(b[axis][i])).sum::<f64>());
+        let of = |axis: usize| {
+            let (a, b) = (&a[axis], &b[axis]);
+            parallel::map(self.runs[axis].len(), |i| {
+                let faces = self.runs[axis][i].iter().flat_map(|run| a[run.clone()].iter().zip(&b[run.clone()]));
+                faces.fold(0.0, |sum, (a, b)| sum + f64::from(*a) * f64::from(*b))
+            })
+        };
         self.grid.axes().flat_map(of).sum()
     }
 
@@ -183,44 +201,44 @@ impl Viscosity {
         }
         let (mut r, mut z, mut p, mut product) = (zero(), zero(), zero(), zero());
         let start = x.clone();
-        self.each(&mut r, |axis, at| self.mass[axis][at] * start[axis][at] - self.times(&start, axis, at));
-        self.each(&mut z, |axis, at| self.inverse[axis][at] * r[axis][at]);
+        self.times(&start, &mut product);
+        self.each(&mut r, |axis, at, _| self.mass[axis][at] * start[axis][at] - product[axis][at]);
+        self.each(&mut z, |axis, at, _| self.inverse[axis][at] * r[axis][at]);
         p.clone_from(&z);
         let mut rz = self.dot(&r, &z);
         let mut scale = zero();
-        self.each(&mut scale, |axis, at| self.mass[axis][at] * start[axis][at]);
+        self.each(&mut scale, |axis, at, _| self.mass[axis][at] * start[axis][at]);
         let enough = TOLERANCE * TOLERANCE * self.dot(&scale, &start).max(rz);
         let mut iterations = 0;
         while rz > enough && iterations < ITERATIONS {
             iterations += 1;
-            self.each(&mut product, |axis, at| self.times(&p, axis, at));
+            self.times(&p, &mut product);
             let alpha = (rz / self.dot(&p, &product)) as Real;
             if !alpha.is_finite() {
                 break;
             }
-            for axis in self.grid.axes() {
-                let (p, product) = (&p[axis], &product[axis]);
-                chunks(&mut x[axis], |start, x| x.iter_mut().zip(&p[start..]).for_each(|(x, p)| *x += alpha * p));
-                chunks(&mut r[axis], |start, r| r.iter_mut().zip(&product[start..]).for_each(|(r, q)| *r -= alpha * q));
-            }
-            self.each(&mut z, |axis, at| self.inverse[axis][at] * r[axis][at]);
+            self.each(&mut x, |axis, at, x| x + alpha * p[axis][at]);
+            self.each(&mut r, |axis, at, r| r - alpha * product[axis][at]);
+            self.each(&mut z, |axis, at, _| self.inverse[axis][at] * r[axis][at]);
             let after = self.dot(&r, &z);
             let beta = (after / rz) as Real;
-            for axis in self.grid.axes() {
-                let z = &z[axis];
-                chunks(&mut p[axis], |start, p| p.iter_mut().zip(&z[start..]).for_each(|(p, z)| *p = z + beta * *p));
-            }
+            self.each(&mut p, |axis, at, p| z[axis][at] + beta * p);
             rz = after;
         }
         report.linear += iterations;
         report.unconverged += u64::from(rz > enough || rz.is_nan());
         for (axis, part) in self.grid.axes().zip(&mut u.parts) {
-            let (free, x) = (&self.inverse[axis], &x[axis]);
-            chunks(&mut part.data, |start, u| {
-                for (i, u) in u.iter_mut().enumerate().filter(|(i, _)| free[start + i] > 0.0) {
-                    *u = x[start + i];
-                }
-            });
+            self.along(axis, &mut part.data, |at, _| x[axis][at]);
         }
     }
+}
+
+/// Where numbers are above zero, in a row.
+fn runs(free: &[Real]) -> impl Iterator<Item = Range<usize>> + '_ {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let start = at + free[at..].iter().position(|f| *f > 0.0)?;
+        at = free[start..].iter().position(|f| *f <= 0.0).map_or(free.len(), |n| start + n);
+        Some(start..at)
+    })
 }
