@@ -85,6 +85,25 @@ def test_a_stage_has_another_mesh_in_each_frame(run: Run, tmp_path: Path) -> Non
         np.testing.assert_allclose(mesh.GetVelocitiesAttr().Get(i), table["velocity"], atol=1e-6)
 
 
+def test_spray_is_in_runs_pictures_and_stages(tmp_path: Path) -> None:
+    """A ball of water that hits the floor at 5 m/s."""
+    fill = {"shape": {"sphere": {"center": [0, 0, 0.4], "radius": RADIUS}}, "velocity": [0, 0, -5]}
+    run = simulate(ball(fill=[fill], whitewater={}) | {"time": {"fps": 50, "frames": 8}}, tmp_path / "run")
+    first, last = run.frame(0), run.frame(8)
+    for name in ("water.spray", "water.foam", "water.bubbles"):
+        assert len(first[name]["id"]) == 0 and len(last[name]["id"]) > 20
+        assert np.isfinite(last[name]["position"]).all() and last[name]["age"].max() <= 8 / 50
+    drawn = {thing.name: thing for thing in Stage(run).things(8) if thing}
+    assert {"water.surface", "water.spray", "water.foam", "water.bubbles"} <= set(drawn)
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(usd.write(run, tmp_path)))
+    points = UsdGeom.Points(stage.GetPrimAtPath("/scene/water_spray"))
+    np.testing.assert_allclose(points.GetPointsAttr().Get(8), last["water.spray"]["position"], atol=1e-6)
+    np.testing.assert_allclose(points.GetVelocitiesAttr().Get(8), last["water.spray"]["velocity"], atol=1e-6)
+
+
 @pytest.mark.usefixtures("oracle")
 def test_its_cells_are_a_level_set(run: Run, tmp_path: Path) -> None:
     goal = vdb.write(run, tmp_path, tolerance=0.0)
@@ -132,6 +151,6 @@ def test_the_dam_of_the_laboratory(tumble: Callable[..., Answer], tmp_path: Path
     done = tumble("lab", "dam", "--cells", 16, "--out", tmp_path / "dam")
     assert done.code == 0, done.err
     page = (tmp_path / "dam/dam.html").read_text(encoding="utf-8")
-    for name in ("PIC", "FLIP", "APIC", "position-based"):
+    for name in ("PIC", "FLIP", "APIC", "affine FLIP", "position-based"):
         assert f"<b>{name}</b>: front" in page
     assert (tmp_path / "dam/dam.png").stat().st_size > 50_000

@@ -46,6 +46,7 @@ def test_each_object_of_a_scene_has_a_look(path: Path) -> None:
     names = [
         n for name, count in pieces.items() for n in ([f"{name}.{k + 1}" for k in range(count)] if count else [name])
     ]
+    names += [f"{t['name']}.{kind}" for t in things if t.get("whitewater") for kind in ("spray", "foam", "bubbles")]
     # Of a liquid the surface is seen.
     shown = [look.object.removesuffix(".surface") for look in looks.of(scene).objects]
     assert sorted(shown) == sorted(names)

@@ -56,6 +56,7 @@ BEGINNINGS = {
     "liquid/bath": 3,
     "liquid/dam": 6,
     "liquid/drop": 2,
+    "liquid/honey": 4,
     "liquid/pour": 2,
     "liquid/raft": 2,
     "liquid/tension": 4,

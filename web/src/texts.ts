@@ -224,6 +224,7 @@ const CHOICES: Record<string, string> = {
   liquid: "Water with a surface: particles carry it, a grid finds its pressure.",
   pic: "Particles take the velocity of the grid: smooth, and damps strongly.",
   flip: "Particles add what the grid has changed: lively and noisy.",
+  affine_flip: "FLIP with the gradient of APIC: keeps more energy than either, and as much noise as FLIP.",
   apic: "Particles take the velocity of the grid and its gradient: smooth, and what turns goes on turning.",
   forward_euler: "The simplest. It gains energy, and explodes where springs are stiff.",
   symplectic_euler: "As cheap as forward Euler; its energy stays near the right one.",

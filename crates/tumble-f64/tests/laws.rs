@@ -46,3 +46,4 @@ mod solids;
 mod stability_estimate;
 mod thin_walls;
 mod transport;
+mod whitewater;

@@ -118,6 +118,11 @@ METHODS = (
     Method("PIC", "particles carry, a grid pushes and smooths", partial(on_a_grid, {"transfer": "pic"})),
     Method("FLIP", "particles carry, a grid pushes", partial(on_a_grid, {"transfer": "flip"})),
     Method("APIC", "particles carry, a grid pushes and knows how they turn", partial(on_a_grid, {"transfer": "apic"})),
+    Method(
+        "affine FLIP",
+        "particles carry, and keep some of their own; a grid knows how they turn",
+        partial(on_a_grid, {"transfer": "affine_flip"}),
+    ),
     Method("APIC, volume not kept", "the same without its second pressure", partial(on_a_grid, {"keep_volume": False})),
     Method("position-based", "particles carry and push each other", of_particles),
 )
@@ -266,7 +271,7 @@ def _pictures(figure: FigureBase, courses: list[Course]) -> None:
 
 def _fronts(figure: FigureBase, courses: list[Course]) -> None:
     front, height = figure.subplots(1, 2)
-    for ink, course in zip(PALETTE, courses, strict=False):
+    for ink, course in zip(PALETTE, courses, strict=True):
         front.plot(np.array(course.times) + LATE, course.fronts, color=ink, label=course.method.title)
         height.plot(course.times, course.heights, color=ink, label=course.method.title)
     front.plot(MEASURED[:, 0], MEASURED[:, 1], "o", color=INK, ms=4, label="measured")
@@ -278,7 +283,7 @@ def _fronts(figure: FigureBase, courses: list[Course]) -> None:
 
 def _kept(figure: FigureBase, courses: list[Course]) -> None:
     energy, volume = figure.subplots(1, 2)
-    for ink, course in zip(PALETTE, courses, strict=False):
+    for ink, course in zip(PALETTE, courses, strict=True):
         energy.plot(course.times, course.energies, color=ink, label=course.method.title)
         if course.volumes:
             volume.plot(course.times, course.volumes, color=ink, label=course.method.title)

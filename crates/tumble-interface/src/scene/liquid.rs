@@ -52,8 +52,8 @@ pub struct Liquid {
     /// How velocities go from particles to the grid and back.
     #[serde(default)]
     pub transfer: LiquidTransfer,
-    /// Part of their own velocity that particles keep, with the change on the grid added (`transfer = "flip"` only): the rest is that of the grid, and 0
-    /// would be `pic`. Default: 0.97.
+    /// Part of their own velocity that particles keep, with the change on the grid added (`flip` and `affine_flip` only): the rest is that of the grid, and 0
+    /// would be `pic`, or `apic`. Default: 0.97.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub flip_ratio: Option<f64>,
@@ -71,6 +71,10 @@ pub struct Liquid {
     /// particles. Default: true, false in the plane, where there is none.
     #[serde(default)]
     pub surface: Option<bool>,
+    /// Spray, foam and bubbles, for pictures: particles without mass, objects `NAME.spray`, `NAME.foam` and `NAME.bubbles`; `{}` for what water does.
+    /// Default: none.
+    #[serde(default)]
+    pub whitewater: Option<LiquidWhitewater>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB). Default: from dark to light with the speed.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -155,6 +159,54 @@ pub enum LiquidTransfer {
     /// Affine particle in cell: it takes the velocity of the grid and its gradient. Smooth, and keeps angular momentum.
     #[default]
     Apic,
+    /// FLIP with the gradient of APIC: a particle adds what the grid has changed, and takes the gradient. Keeps more energy than either, and as much noise as FLIP.
+    AffineFlip,
+}
+
+/// What a liquid looks like where it takes up air. Pairs are bounds from which, and up to which, more is born; those of water: below 1 m/s or so its
+/// surface tension keeps air out. Smaller scenes with foam need smaller ones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LiquidWhitewater {
+    /// Particles that one of the liquid gives in a second, at most, where it runs together and traps air.
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-unit" = "1/s"))]
+    pub trapped_rate: f64,
+    /// Particles that one of the liquid gives in a second, at most, on crests that go forward.
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-unit" = "1/s"))]
+    pub crest_rate: f64,
+    /// Speed of the liquid.
+    #[schemars(inner(range(min = 0.0)), extend("x-unit" = "m/s"))]
+    pub speed: [f64; 2],
+    /// How fast the liquid within a cell around runs together, mean.
+    #[schemars(inner(range(min = 0.0)), extend("x-unit" = "m/s"))]
+    pub trapped: [f64; 2],
+    /// How sharp a crest is: 1 - cosine between normals within a cell, mean.
+    #[schemars(inner(range(min = 0.0)), extend("x-unit" = "1"))]
+    pub crest: [f64; 2],
+    /// Time that a particle may be foam, at least and at most, equally likely in between; spray that lies on a solid is as short-lived.
+    #[schemars(inner(range(min = 0.0)), extend("x-unit" = "s"))]
+    pub life: [f64; 2],
+    /// Speed at which bubbles rise in the liquid around: 0.25 for those of some millimetres in water.
+    #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
+    pub rise: f64,
+    /// How many particles there are at most; beyond, the oldest go.
+    #[schemars(range(min = 1, max = 10_000_000), extend("x-unit" = "1"))]
+    pub limit: u32,
+}
+
+impl Default for LiquidWhitewater {
+    fn default() -> Self {
+        Self {
+            trapped_rate: 100.0,
+            crest_rate: 300.0,
+            speed: [1.0, 4.0],
+            trapped: [0.3, 2.0],
+            crest: [0.15, 0.6],
+            life: [1.0, 3.0],
+            rise: 0.25,
+            limit: 200_000,
+        }
+    }
 }
 
 /// Pressure solver of a liquid.

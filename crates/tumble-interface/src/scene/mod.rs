@@ -42,7 +42,7 @@ pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use joints::{Joint, JointKind, JointMotor};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
-pub use liquid::{Liquid, LiquidDrain, LiquidFill, LiquidInflow, LiquidPressure, LiquidTransfer};
+pub use liquid::{Liquid, LiquidDrain, LiquidFill, LiquidInflow, LiquidPressure, LiquidTransfer, LiquidWhitewater};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use rigid::{Arrange, BirthRegion, Body, BodyEmit, BodyPart, BodyShape, Fracture, Rigid};

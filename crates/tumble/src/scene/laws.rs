@@ -25,7 +25,8 @@ pub struct Reader<'a> {
     /// Times of the run [s].
     times: Vec<f64>,
     flat: Option<usize>,
-    seed: u32,
+    /// Seed of the scene.
+    pub seed: u32,
 }
 
 impl<'a> Reader<'a> {

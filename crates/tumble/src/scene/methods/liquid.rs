@@ -6,7 +6,7 @@ use crate::fluids::{Immersed, Solids};
 use crate::forces::Gravity;
 use crate::geometry::Collider;
 use crate::math::formula::Of;
-use crate::math::{Real, Vec3, VectorSignal};
+use crate::math::{Random, Real, Vec3, VectorSignal};
 use crate::recipes::{placed, region, volume};
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -15,11 +15,15 @@ use crate::scene::laws::{Reader, flat, off_plane};
 use crate::scene::plausible::odd_density;
 use crate::state::Grid;
 use crate::system::System;
-use crate::systems::liquid::{Accuracy, Inflow, Liquid as Tanks, Openings, Particles, Region, Settings, Tank, Transfer, longest};
+use crate::systems::liquid::{
+    Accuracy, Inflow, Kind, Liquid as Tanks, Openings, Particles, Region, Settings, Tank, Transfer, Whitewater, WhitewaterSettings, longest,
+};
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
-use tumble_interface::scene::{AnimatedVector, Liquid, LiquidFill, LiquidTransfer, MeshFile, Method, Scene, Shape, Solid, System as Plan};
+use tumble_interface::scene::{
+    AnimatedVector, Liquid, LiquidFill, LiquidTransfer, LiquidWhitewater, MeshFile, Method, Scene, Shape, Solid, System as Plan,
+};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, Warning};
 
@@ -41,6 +45,10 @@ const VISCOUS: f64 = 31.0;
 const CURVED: f64 = 2.0;
 /// Numbers for a particle: its rows twice, and a snapshot.
 const PARTICLE: f64 = 63.0;
+/// Numbers for one of spray, foam and bubbles: a row, one of the next step, and a snapshot.
+const WHITE: f64 = 24.0;
+/// Colour of spray, foam and bubbles.
+const FOAM: [f64; 3] = [0.9, 0.93, 0.95];
 
 pub struct Rules;
 
@@ -80,8 +88,8 @@ impl MethodRules for Rules {
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
         for thing in &scene.liquid {
-            if thing.flip_ratio.is_some() && thing.transfer != LiquidTransfer::Flip {
-                let message = "given without transfer = \"flip\"; leave it out, or set that";
+            if thing.flip_ratio.is_some() && !matches!(thing.transfer, LiquidTransfer::Flip | LiquidTransfer::AffineFlip) {
+                let message = "given without transfer = \"flip\" or \"affine_flip\"; leave it out, or set one of them";
                 issues.push(Issue::new(format!("liquid \"{}\".flip_ratio", thing.name), message));
             }
             if thing.surface == Some(true) && scene.dimension == 2 {
@@ -92,6 +100,7 @@ impl MethodRules for Rules {
                 let message = "no_slip without viscosity, which is what sticks; set viscosity, 1e-3 Pa s for water, or leave it out";
                 issues.push(Issue::new(format!("liquid \"{}\".solids", thing.name), message));
             }
+            issues.extend(upside_down(thing));
             let flows = !thing.inflow.is_empty() || !thing.drain.is_empty();
             if flows && scene.expect.max_volume_error.is_some() {
                 let message = format!("\"{}\" comes in or leaves, so that its volume is meant to change; leave it out", thing.name);
@@ -120,15 +129,21 @@ impl MethodRules for Rules {
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let own = scene.liquid.iter().filter(|thing| is_in(&thing.system, plan));
-        own.map(|thing| {
+        let mut looks = Vec::new();
+        for thing in own {
             if has_surface(thing, flat(scene)) {
-                return Look::new(&format!("{}.surface", thing.name), Form::Liquid, thing.color.unwrap_or(WATER));
+                looks.push(Look::new(&format!("{}.surface", thing.name), Form::Liquid, thing.color.unwrap_or(WATER)));
+            } else {
+                let radius = 0.5 * spacing(thing, flat(scene));
+                let few = fill_cells(thing, flat(scene)) * per_cell(thing, flat(scene)) < FEW;
+                looks.push(Look { few, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) });
             }
-            let radius = 0.5 * spacing(thing, flat(scene));
-            let few = fill_cells(thing, flat(scene)) * per_cell(thing, flat(scene)) < FEW;
-            Look { few, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) }
-        })
-        .collect()
+            if thing.whitewater.is_some() {
+                let white = |(_, word)| Look::new(&format!("{}.{word}", thing.name), Form::Points, FOAM);
+                looks.extend(Kind::ALL.map(white).map(|look| look.with_radius(Whitewater::radius(cell(thing, flat(scene))))));
+            }
+        }
+        looks
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
@@ -136,7 +151,8 @@ impl MethodRules for Rules {
         let of = |thing: &Liquid| {
             let viscous = if thing.viscosity > 0.0 { VISCOUS } else { 0.0 };
             let curved = if thing.surface_tension > 0.0 { CURVED } else { 0.0 };
-            (CELL + viscous + curved) * cells(&thing.cells, flat) + PARTICLE * per_cell(thing, flat) * fill_cells(thing, flat)
+            let white = thing.whitewater.as_ref().map_or(0.0, |words| WHITE * f64::from(words.limit));
+            (CELL + viscous + curved) * cells(&thing.cells, flat) + PARTICLE * per_cell(thing, flat) * fill_cells(thing, flat) + white
         };
         scene.liquid.iter().map(of).sum::<f64>() * size_of::<Real>() as f64
     }
@@ -176,6 +192,31 @@ fn cell(words: &Liquid, flat: Option<usize>) -> f64 {
 /// Distance of particles at the start [m].
 fn spacing(words: &Liquid, flat: Option<usize>) -> f64 {
     cell(words, flat) / f64::from(words.sampling)
+}
+
+fn of_whitewater(words: &LiquidWhitewater) -> WhitewaterSettings {
+    WhitewaterSettings {
+        rates: [words.trapped_rate, words.crest_rate],
+        speed: words.speed,
+        trapped: words.trapped,
+        crest: words.crest,
+        life: words.life,
+        rise: words.rise,
+        limit: words.limit as usize,
+    }
+}
+
+/// Pairs of whitewater whose second number is not above the first.
+fn upside_down(thing: &Liquid) -> impl Iterator<Item = Issue> {
+    let pairs = thing.whitewater.iter().flat_map(|words| {
+        let thresholds = [("speed", words.speed), ("trapped", words.trapped), ("crest", words.crest)];
+        let wrong = |(_, [low, high]): &(&str, [f64; 2])| low >= high;
+        thresholds.into_iter().filter(wrong).chain([("life", words.life)].into_iter().filter(|(_, [low, high])| low > high))
+    });
+    pairs.map(|(key, [low, high])| {
+        let message = format!("[{low}, {high}], expected a lower and an upper bound; swap or spread them");
+        Issue::new(format!("liquid \"{}\".whitewater.{key}", thing.name), message)
+    })
 }
 
 /// Cells that the fills take, at most.
@@ -262,11 +303,13 @@ impl Read<'_, '_> {
         if self.reader.issues.len() > before {
             return None;
         }
-        let transfer = match words.transfer {
-            LiquidTransfer::Pic => Transfer::Pic,
-            LiquidTransfer::Flip => Transfer::Flip(words.flip_ratio.unwrap_or(FLIP)),
-            LiquidTransfer::Apic => Transfer::Apic,
+        let (affine, own) = match words.transfer {
+            LiquidTransfer::Pic => (false, false),
+            LiquidTransfer::Flip => (false, true),
+            LiquidTransfer::Apic => (true, false),
+            LiquidTransfer::AffineFlip => (true, true),
         };
+        let transfer = Transfer { ratio: if own { words.flip_ratio.unwrap_or(FLIP) } else { 0.0 }, affine };
         let settings = Settings {
             density: words.density,
             viscosity: words.viscosity,
@@ -287,8 +330,10 @@ impl Read<'_, '_> {
             },
             courant: words.courant,
         };
-        let particles = Particles::new(x, v, transfer == Transfer::Apic);
-        match Tank::new(words.name.clone(), settings, grid, solids, particles, openings) {
+        let particles = Particles::new(x, v, affine);
+        let whitewater =
+            words.whitewater.as_ref().map(|white| Whitewater::new(of_whitewater(white), Random::new(self.reader.seed, &words.name)));
+        match Tank::new(words.name.clone(), settings, grid, solids, particles, openings, whitewater) {
             Ok(tank) => Some(tank),
             Err(error) => {
                 self.wrong(".box", error.to_string());

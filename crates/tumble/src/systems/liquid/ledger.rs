@@ -127,8 +127,18 @@ impl Tank {
         }
     }
 
+    /// Columns of its spray, foam and bubbles, objects of their own.
+    pub fn whitewater_columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        if let Some(whitewater) = &self.whitewater {
+            whitewater.columns(&self.name, |x| self.place(x), names, out);
+        }
+    }
+
     /// What does not change.
     pub fn topology(&self, out: &mut Vec<Column>) {
+        if let Some(whitewater) = &self.whitewater {
+            whitewater.topology(&self.name, self.grid().dx, out);
+        }
         out.extend(self.grid().columns(&format!("{}.cells", self.name)));
         out.push(Column::new(&self.name, "radius", vec![self.radius()]));
         if !self.openings.any() {
@@ -217,6 +227,7 @@ impl Tank {
         archive.push("openings", Part::Numbers(self.openings.numbers()));
         let bodies = self.solids.as_ref().map_or(&[][..], |solids| &solids.bodies);
         archive.push("bodies", Part::Numbers(bodies.iter().flat_map(Immersed::numbers).collect()));
+        self.whitewater.iter().for_each(|whitewater| whitewater.save(archive));
     }
 
     /// Reads it back.
@@ -245,6 +256,7 @@ impl Tank {
         let bodies = self.bodies();
         (numbers.len() == Immersed::NUMBERS * bodies.len()).then_some(())?;
         bodies.iter_mut().zip(numbers.chunks_exact(Immersed::NUMBERS)).for_each(|(body, numbers)| body.put(numbers));
+        self.whitewater.iter_mut().try_for_each(|whitewater| whitewater.restore(archive))?;
         if let Some(solids) = self.solids.as_mut().filter(|solids| solids.moves()) {
             solids.time = f64::NAN;
             self.put(time);

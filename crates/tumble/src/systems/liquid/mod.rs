@@ -13,6 +13,7 @@ mod flow;
 mod ledger;
 mod level;
 mod particles;
+mod paths;
 mod pressure;
 mod relax;
 mod skin;
@@ -21,12 +22,14 @@ mod stencil;
 mod tank;
 mod tension;
 mod viscosity;
+mod whitewater;
 
 pub use flow::{Inflow, Openings, Region};
 pub use particles::Particles;
 pub use pressure::Accuracy;
 pub use tank::{Settings, Tank, Transfer};
 pub use tension::longest;
+pub use whitewater::{Kind, Settings as WhitewaterSettings, Whitewater};
 
 use crate::exchange::Turn;
 use crate::integrators::equal_steps;
@@ -115,6 +118,7 @@ impl System for Liquid {
         for tank in &self.tanks {
             tank.columns(names, out);
             tank.skin_columns(names, out);
+            tank.whitewater_columns(names, out);
             tank.cell_columns(names, out);
         }
         if names.contains(&"force") {

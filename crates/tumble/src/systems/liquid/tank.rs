@@ -4,12 +4,14 @@ use super::extend::{self, Marks, empty, extend, mark};
 use super::flow::Openings;
 use super::level::{Level, cell, share};
 use super::particles::{Gradient, Particles};
+use super::paths::{SIDE, go, push_out};
 use super::pressure::{Accuracy, Matrix};
 use super::relax::spread;
 use super::splat::{self, LEAST};
 use super::stencil::Sampler;
 use super::tension::{curvatures, longest};
 use super::viscosity::Viscosity;
+use super::whitewater::{Around, Whitewater};
 use crate::exchange::{Exchange, Turn};
 use crate::fluids::{Beyond, Failure, Immersed, Solids};
 use crate::forces::Gravity;
@@ -22,26 +24,17 @@ use tumble_interface::engine::StepReport;
 
 /// Layers beyond the liquid that take its velocity, whatever particles there carry: those of its surface.
 const SKIN: usize = 2;
-/// How far from a side of the box particles stay [cells].
-const SIDE: Real = 1e-3;
-/// How far from a solid particles stay [cells].
-const GAP: Real = 0.05;
-
-/// Parts of a cell in which particles go near solids; walls count as two cells thick.
-const STRIDES: Real = 4.0;
 
 /// Change of a velocity by the pressure of half a step, over it, from which it is a blow.
 const BLOW: Real = 0.5;
 
 /// How velocities go from particles to the grid and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Transfer {
-    /// Particles take the velocity of the grid.
-    Pic,
-    /// They add what the grid has changed, and take this part of the sum, the rest from the grid.
-    Flip(f64),
-    /// They take the velocity of the grid and its gradient.
-    Apic,
+pub struct Transfer {
+    /// Part of what is their own that particles keep, with the velocity of the grid for the rest: 0 in PIC and APIC.
+    pub ratio: f64,
+    /// Whether they take the gradient of the grid's velocity, too: APIC, affine FLIP.
+    pub affine: bool,
 }
 
 /// Constant settings of a liquid.
@@ -88,6 +81,8 @@ pub struct Tank {
     pub last: f64,
     /// Where it comes in and leaves.
     pub openings: Openings,
+    /// Its spray, foam and bubbles, where they are asked for.
+    pub whitewater: Option<Whitewater>,
     pub(super) level: Level,
     pub(super) solids: Option<Solids>,
     grid: Grid,
@@ -118,10 +113,12 @@ impl Tank {
         solids: Option<Solids>,
         particles: Particles,
         openings: Openings,
+        whitewater: Option<Whitewater>,
     ) -> Result<Self, GridError> {
         let mut tank = Self {
             name,
             openings: Openings { next: particles.count() as u32, ..openings },
+            whitewater,
             particles,
             pressure: Field::new(grid, Place::Cell, "Pa")?,
             last: 0.0,
@@ -251,8 +248,16 @@ impl Tank {
             solids.lift(h, before, |at| cells[at as usize] == cell::LIQUID);
         }
         self.half((t + 0.5 * h, end), h, true, report)?;
+        self.whiten(end, h);
         chunks(&mut self.pressure.data, |start, p| p.iter_mut().zip(&first[start..]).for_each(|(p, first)| *p += 2.0 * first));
         Ok(())
+    }
+
+    /// Moves its spray, foam and bubbles for h seconds until t [s].
+    fn whiten(&mut self, t: f64, h: f64) {
+        let Self { whitewater: Some(whitewater), particles, settings, level, u, solids, .. } = self else { return };
+        let (distance, gravity) = (&level.distance, settings.gravity.at(t));
+        whitewater.step(&Around { particles, sampling: settings.sampling, distance, u, solids: solids.as_ref(), gravity }, h);
     }
 
     /// Half of a step of h seconds between two times [s].
@@ -405,7 +410,7 @@ impl Tank {
     fn give_to_particles(&mut self, ways: Option<&[[Real; 3]]>, second: bool, t: f64, half: f64) {
         let Self { particles, u, way, before, settings, solids, grid, openings, .. } = self;
         let comes_in = openings.velocity(t, grid);
-        let (comes_in, pace) = (&comes_in, (half / grid.dx) as Real);
+        let (comes_in, pace, ratio) = (&comes_in, (half / grid.dx) as Real, settings.transfer.ratio as Real);
         let (velocity, before, way) = (Sampler::new(u), Sampler::new(before), Sampler::new(way));
         let Particles { x, v, gradient, .. } = particles;
         let gradients = gradient.chunks_mut(CHUNK).map(Some).chain(std::iter::repeat_with(|| None));
@@ -425,30 +430,20 @@ impl Tank {
                     gradient.iter_mut().for_each(|gradient| gradient[i] = Gradient::default());
                     continue;
                 }
-                if let Some(gradient) = &mut gradient {
+                let (new, old) = if let Some(gradient) = &mut gradient {
                     let ((new, slope), (old, before)) = (velocity.with_gradient(x), before.with_gradient(x));
                     let more = more(&new, &old);
-                    let carried = |new: Real, old: Real| new + more * (new - old);
-                    *v = std::array::from_fn(|a| carried(new[a], old[a]));
-                    gradient[i] = std::array::from_fn(|a| std::array::from_fn(|b| carried(slope[a][b], before[a][b])));
+                    gradient[i] = std::array::from_fn(|a| std::array::from_fn(|b| slope[a][b] + more * (slope[a][b] - before[a][b])));
+                    (new, old)
                 } else {
-                    let (new, old) = (velocity.read(x), before.read(x));
-                    let more = more(&new, &old);
-                    let ratio = if let Transfer::Flip(ratio) = settings.transfer { ratio as Real } else { 0.0 };
-                    *v = std::array::from_fn(|a| new[a] + more * (new[a] - old[a]) + ratio * (v[a] - old[a]));
-                }
+                    (velocity.read(x), before.read(x))
+                };
+                let more = more(&new, &old);
+                *v = std::array::from_fn(|a| new[a] + more * (new[a] - old[a]) + ratio * (v[a] - old[a]));
                 // Straight on: what goes its way with its own velocity keeps its angular momentum.
                 let mut all = way.read(x);
                 ways.iter().for_each(|ways| (0..3).for_each(|a| all[a] += ways[task * CHUNK + i][a]));
-                let strides = solids.as_ref().map_or(1, |solids| strides(solids, grid, x, &all));
-                for _ in 0..strides {
-                    for a in grid.axes() {
-                        x[a] = (x[a] + all[a] / strides as Real).max(SIDE).min(tops[a]);
-                    }
-                    if let (true, Some(solids)) = (strides > 1, solids.as_ref()) {
-                        push_out(solids, grid, x);
-                    }
-                }
+                go(solids.as_ref(), grid, x, &all);
             }
         });
     }
@@ -459,26 +454,6 @@ impl Tank {
         let grid = self.grid;
         chunks(&mut self.particles.x, |_, x| x.iter_mut().for_each(|x| push_out(solids, &grid, x)));
     }
-}
-
-/// Moves a particle out of solids.
-fn push_out(solids: &Solids, grid: &Grid, x: &mut [Real; 3]) {
-    let (distance, normal) = solids.near(x);
-    let lack = GAP - distance * (1.0 / grid.dx) as Real;
-    if lack > 0.0 {
-        for a in grid.axes() {
-            x[a] = (x[a] + lack * normal[a]).max(SIDE).min(grid.n[a] as Real - SIDE);
-        }
-    }
-}
-
-/// Parts of a way [cells] that may lead into a solid: so short that what enters one is put back on the side from which it came.
-fn strides(solids: &Solids, grid: &Grid, x: &[Real; 3], way: &[Real; 3]) -> usize {
-    let long = grid.axes().map(|a| way[a] * way[a]).sum::<Real>().sqrt();
-    if solids.near(x).0 * (1.0 / grid.dx) as Real > long + GAP {
-        return 1;
-    }
-    1 + (STRIDES * long).min(64.0) as usize
 }
 
 /// Adds so many times other velocities.
