@@ -49,7 +49,7 @@ const AT: Record<string, number> = {
   "liquid/dam": 16,
   "liquid/bath": 8,
   "liquid/drop": 12,
-  "liquid/honey": 30,
+  "liquid/honey": 24,
   "liquid/pour": 22,
   "liquid/raft": 18,
   "liquid/tension": 12,
