@@ -100,9 +100,9 @@ pub struct Whitewater {
 
 /// The liquid that they are in.
 pub struct Around<'a> {
-    /// Sorted particles, as many along the edge of a cell at the start.
+    /// Its particles, sorted.
     pub particles: &'a Particles,
-    /// See above.
+    /// How many of them lay along the edge of a cell at the start.
     pub sampling: u32,
     /// Distance of cells from its surface [cells].
     pub distance: &'a Field,
@@ -503,6 +503,27 @@ mod tests {
         let flat = |x: [f64; 3]| ((x[0] - 8.0) + (x[2] - 8.0)) / 2.0_f64.sqrt();
         assert!(crest(&edge, 2.0) > 30, "{}", crest(&edge, 2.0));
         assert_eq!((crest(&edge, -2.0), crest(&flat, 2.0)), (0, 0));
+    }
+
+    #[test]
+    fn they_are_born_in_the_cylinder_that_a_particle_has_come_through() {
+        let pair = [([8.0, 8.0, 4.0], [2.0, 0.0, 0.0]), ([8.5, 8.0, 4.0], [-2.0, 0.0, 0.0])];
+        let mut white = of(Settings { rates: [1e5, 0.0], limit: 10_000, ..settings() }, Vec::new());
+        Sea::new(|_| -1.5, [0.0; 3], &pair).run(&mut white, 1, 0.05);
+        assert!(white.drops.len() > 2000, "{}", white.drops.len());
+        let (mut squares, mut widest, mut sideways) = (0.0, 0.0_f64, 0.0_f64);
+        for Drop { x, v, kind, .. } in &white.drops {
+            let along = if v[0] > 0.0 { 8.0 - x[0] } else { x[0] - 8.5 };
+            assert!(*kind == Kind::Bubble && (v[0].abs() - 2.0).abs() < 1e-6 && (-1e-5..0.10001).contains(&along), "{x:?} {v:?} {kind:?}");
+            let out = f64::from((x[1] - 8.0).hypot(x[2] - 4.0));
+            squares += out * out;
+            widest = widest.max(out);
+            sideways = sideways.max(f64::from(v[1].hypot(v[2])));
+        }
+        // A disk of half the distance of particles, evenly, and a tenth of the speed.
+        let mean = squares / white.drops.len() as f64 / (0.25 * 0.25);
+        assert!((mean - 0.5).abs() < 0.03 && widest > 0.24 && widest < 0.2501, "{mean} {widest}");
+        assert!(sideways > 0.19 && sideways < 0.2001, "{sideways}");
     }
 
     #[test]
