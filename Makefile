@@ -12,7 +12,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test prepare rust-tests lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb blender validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare rust-tests rust-tests-next lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb blender validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -59,14 +59,18 @@ test:
 	echo "All tests passed."; \
 	awk '{ printf "%-12s %5d s\n", $$1, $$2; sum += $$2 } END { printf "%-12s %5d s\n", "all", sum }' target/seconds
 
-# Downloads beside the first build, and one build after the other: each keeps two cores busy with two engines, and four compilers of
-# engines at a time take a third longer and twice the memory.
+# Downloads beside the first build. The native build waits until clippy is done, and takes what the one for browsers leaves: its
+# dependencies fill the end of the other, and two engines at a time keep two cores busy; four take a third longer and twice the memory.
 prepare:
-	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports lint-rust wasm
-	@$(MAKE) --no-print-directory rust-tests
+	@$(MAKE) --no-print-directory -j 6 debian web/node_modules/.ready wasm rust-tests-next
 
-rust-tests: $(VENV)/.engine
+rust-tests-next: $(VENV)/.imports lint-rust
+	@nice $(MAKE) --no-print-directory rust-tests
+
+# Python's engine last: what tests link is built beside the engines.
+rust-tests: $(VENV)/.imports
 	@cargo test $(RUST_TESTS) --no-run --quiet
+	@$(MAKE) --no-print-directory setup
 
 lint-rust:
 	cargo fmt --all --check

@@ -121,6 +121,7 @@ fn a_flat_sheet_falls_at_terminal_velocity() {
 
 /// Cloth of 20 g/m² in a wind of 60 m/s, two sub-steps a frame of 1/60 s: the air can do no more than take the cloth along.
 #[test]
+#[ignore = "long: make validate"]
 fn light_cloth_in_a_storm_is_not_torn_off_by_round_numbers() {
     for scheme in ["position_based", "implicit_euler"] {
         let mut sim = simulation(&format!(

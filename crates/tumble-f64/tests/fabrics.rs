@@ -260,6 +260,7 @@ fn across(fabric: &Fabric, angle: f64) -> [f64; 5] {
 /// Peirce's test: a strip whose overhang is twice its bending length c = (B/(rho g))^(1/3) hangs with its tip 41.5 degrees below the clamp.
 /// shared/validation, 2.2 and 2.3.
 #[test]
+#[ignore = "long: make validate"]
 fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
     let target = 41.5_f64.to_radians().tan();
     // The test's own integrator first: Gamma = 8 is 41.5 degrees.

@@ -99,6 +99,7 @@ pub fn packing(system: &str) -> [f64; 2] {
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn poured_balls_pack_as_densely_as_random_ones() {
     let [part, _] = packing(FORCES);
     assert!((0.6..0.66).contains(&part), "{part}");
@@ -136,6 +137,7 @@ pub fn slope(system: &str, words: &str, count: usize) -> f64 {
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn heaps_are_the_steeper_the_more_friction_there_is() {
     let [smooth, medium, rough] = [0.05, 0.2, 0.6].map(|mu| slope(FORCES, &format!("friction = {mu}\nrolling_friction = 0.1"), 800));
     assert!(smooth < 0.1 && medium > 1.5 * smooth && rough > 1.2 * medium && rough < 0.6, "{smooth} {medium} {rough}");

@@ -84,6 +84,7 @@ fn water_filled_to_the_brim_stays() {
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
     let (spacing, size) = (0.05, [0.5, 0.5, 0.5]);
     let mut sim = simulation(&water(spacing, 0.0, size, "[[force]]\nkind = \"drag\"\nrate = 3\n"));
