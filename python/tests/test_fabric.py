@@ -139,6 +139,7 @@ def drape_coefficients(folder: Path, names: list[str], frames: int) -> list[floa
     return found
 
 
+@pytest.mark.long
 def test_stiffer_cloth_drapes_less(tmp_path: Path) -> None:
     stiff, soft = drape_coefficients(tmp_path, ["broad", "faille"], 30)
     assert 1.0 > stiff > soft + 0.04 and soft > 0.0

@@ -288,8 +288,6 @@ def test_memory_is_estimated() -> None:
         "emitter",
         "solid of changing size",
         "sheet, direct",
-        "solid, direct",
-        "gas in a plane",
         "sound, double",
     ]
     compare_memory({name: ({"version": 1} | LARGE[name], ".") for name in few})
