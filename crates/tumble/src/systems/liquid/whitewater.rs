@@ -505,6 +505,21 @@ mod tests {
         assert_eq!((crest(&edge, -2.0), crest(&flat, 2.0)), (0, 0));
     }
 
+    /// Only neighbours behind the tangent plane count: around a ridge they lie there, in a trough as sharp they lie before it.
+    #[test]
+    fn ridges_are_crests_and_troughs_are_none() {
+        let drops = |bend: f64| {
+            let height = |x: f64| 8.0 - 0.5 * bend * (x - 8.5) * (x - 8.5);
+            let points = (0..9).map(|i| [8.1 + 0.4 * f64::from(i % 3), 7.6 + 0.4 * f64::from(i / 3)]);
+            let particles: Vec<_> = points.map(|[x, y]| ([x, y, height(x)].map(|x| x as Real), [0.0, 0.0, 2.0])).collect();
+            let mut white = of(Settings { rates: [0.0, 1000.0], ..settings() }, Vec::new());
+            Sea::new(|x| x[2] - height(x[0]), [0.0; 3], &particles).run(&mut white, 10, 0.01);
+            white.drops.len()
+        };
+        let (ridge, trough) = (drops(1.0), drops(-1.0));
+        assert!(ridge > 30 && trough == 0, "{ridge} {trough}");
+    }
+
     #[test]
     fn they_are_born_in_the_cylinder_that_a_particle_has_come_through() {
         let pair = [([8.0, 8.0, 4.0], [2.0, 0.0, 0.0]), ([8.5, 8.0, 4.0], [-2.0, 0.0, 0.0])];
