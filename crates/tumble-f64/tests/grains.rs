@@ -387,6 +387,7 @@ fn threads_snapshots_and_far_grains_change_no_bit() {
                 sim.restore(&kept).unwrap();
             }
             run(&mut sim, 4);
+            assert!(sim.ledger().contacts.unwrap() > 1000);
             [positions(&sim, "sand"), velocities(&sim, "sand"), column(&sim, "stones", "angular_velocity")].concat()
         })
     };
