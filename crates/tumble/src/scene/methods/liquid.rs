@@ -194,31 +194,6 @@ fn spacing(words: &Liquid, flat: Option<usize>) -> f64 {
     cell(words, flat) / f64::from(words.sampling)
 }
 
-fn of_whitewater(words: &LiquidWhitewater) -> WhitewaterSettings {
-    WhitewaterSettings {
-        rates: [words.trapped_rate, words.crest_rate],
-        speed: words.speed,
-        trapped: words.trapped,
-        crest: words.crest,
-        life: words.life,
-        rise: words.rise,
-        limit: words.limit as usize,
-    }
-}
-
-/// Pairs of whitewater whose second number is not above the first.
-fn upside_down(thing: &Liquid) -> impl Iterator<Item = Issue> {
-    let pairs = thing.whitewater.iter().flat_map(|words| {
-        let thresholds = [("speed", words.speed), ("trapped", words.trapped), ("crest", words.crest)];
-        let wrong = |(_, [low, high]): &(&str, [f64; 2])| low >= high;
-        thresholds.into_iter().filter(wrong).chain([("life", words.life)].into_iter().filter(|(_, [low, high])| low > high))
-    });
-    pairs.map(|(key, [low, high])| {
-        let message = format!("[{low}, {high}], expected a lower and an upper bound; swap or spread them");
-        Issue::new(format!("liquid \"{}\".whitewater.{key}", thing.name), message)
-    })
-}
-
 /// Cells that the fills take, at most.
 fn fill_cells(words: &Liquid, flat: Option<usize>) -> f64 {
     let dx = cell(words, flat);
@@ -250,6 +225,32 @@ fn too_long(scene: &Scene, plan: &Plan, words: &Liquid) -> Option<Issue> {
         short(most)
     );
     (words.surface_tension > 0.0 && step > most).then(|| Issue::new(format!("system \"{}\".{key}", plan.name), message))
+}
+
+/// Settings of spray, foam and bubbles.
+fn of_whitewater(words: &LiquidWhitewater) -> WhitewaterSettings {
+    WhitewaterSettings {
+        rates: [words.trapped_rate, words.crest_rate],
+        speed: words.speed,
+        trapped: words.trapped,
+        crest: words.crest,
+        life: words.life,
+        rise: words.rise,
+        limit: words.limit as usize,
+    }
+}
+
+/// Pairs of whitewater whose second number is not above the first.
+fn upside_down(thing: &Liquid) -> impl Iterator<Item = Issue> {
+    let pairs = thing.whitewater.iter().flat_map(|words| {
+        let thresholds = [("speed", words.speed), ("trapped", words.trapped), ("crest", words.crest)];
+        let wrong = |(_, [low, high]): &(&str, [f64; 2])| low >= high;
+        thresholds.into_iter().filter(wrong).chain([("life", words.life)].into_iter().filter(|(_, [low, high])| low > high))
+    });
+    pairs.map(|(key, [low, high])| {
+        let message = format!("[{low}, {high}], expected a lower and an upper bound; swap or spread them");
+        Issue::new(format!("liquid \"{}\".whitewater.{key}", thing.name), message)
+    })
 }
 
 /// Reads the words of one liquid; everything wrong goes to the reader.
