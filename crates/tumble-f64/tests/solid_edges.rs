@@ -69,7 +69,7 @@ fn cloth_stays_on_a_wire_that_passes_between_its_masses() {
         "integrator = \"symplectic_euler\"\nsubsteps = 60",
         "integrator = \"dormand_prince\"",
     ];
-    for words in common::cases(schemes, 5) {
+    for words in common::cases(schemes, 3) {
         let scene = |edges: bool| simulation(&format!("{}{}{}", system(words), sheet(ABOVE_WIRE), solid(WIRE, edges, "")));
         let (mut held, mut free, mut crossed) = (scene(true), scene(false), 0);
         for _ in 0..30 {
