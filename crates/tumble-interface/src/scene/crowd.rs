@@ -36,6 +36,9 @@ pub struct Plan {
     /// Floor that slopes.
     #[serde(default)]
     pub ramp: Vec<Ramp>,
+    /// Lines where floors that are drawn side by side go on at each other.
+    #[serde(default)]
+    pub link: Vec<FloorLink>,
     /// Red, green and blue of walls in pictures, 0 to 1, in linear light.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -62,6 +65,21 @@ pub struct Gate {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub closes: Option<f64>,
+}
+
+/// Two lines on a plan that are one place, such as the head of a flight of stairs, drawn on its lower floor, and the landing on the upper one.
+/// Whoever crosses one goes on beyond the other: laid on each other end on end, the two floors continue each other, each on its own side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FloorLink {
+    /// Name, of which a plan has each once, doors included.
+    pub name: String,
+    /// One line, from jamb to jamb, each x and y.
+    #[schemars(extend("x-unit" = "m"))]
+    pub from: [[f64; 2]; 2],
+    /// The other, as long as it, whose ends lie on those of the first one in the same order.
+    #[schemars(extend("x-unit" = "m"))]
+    pub to: [[f64; 2]; 2],
 }
 
 /// A place on the floor that people may have as a goal.

@@ -28,7 +28,7 @@ mod vicsek;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use cloth::{Cloth, Dress, Panel, Seam, Side};
 pub use compressible::Compressible;
-pub use crowd::{Choice, Crowd, Gate, Plan, Preset, Ramp, Stairs, Steering, Walking, Waypoint, corners, floor};
+pub use crowd::{Choice, Crowd, FloorLink, Gate, Plan, Preset, Ramp, Stairs, Steering, Walking, Waypoint, corners, floor};
 pub use emitters::{Between, Burst, Cause, Emit, Emitter, Event, Kill, Source, WhenFull};
 pub use fabrics::{FabricRef, FabricUse, FabricWords};
 pub use forces::{Anchor, Field, Force, Goal};

@@ -8,6 +8,7 @@ mod bodies;
 mod figure;
 mod floor;
 mod journey;
+mod link;
 mod models;
 mod near;
 mod people;

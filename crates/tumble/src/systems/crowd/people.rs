@@ -3,6 +3,7 @@
 use super::around::{Around, Neighbour, Other, Person};
 use super::bodies::Bodies;
 use super::floor::Floor;
+use super::link::Passage;
 use super::models::{Model, Motion};
 use super::near::Near;
 use super::plan::{Point, along, crossing, dot, sub};
@@ -19,6 +20,7 @@ const OVER: f64 = 0.5;
 /// Memory that steps reuse.
 #[derive(Debug, Default)]
 pub struct Scratch {
+    images: Vec<Image>,
     near: Near,
     sorted: Vec<Other>,
     /// What everybody does in this step, cell by cell.
@@ -26,6 +28,17 @@ pub struct Scratch {
     /// The same by rows.
     pub moves: Vec<Move>,
 }
+
+/// Somebody near a line of a link, as seen from beyond the other.
+#[derive(Debug)]
+struct Image {
+    row: u32,
+    passage: Passage,
+    x: Point,
+}
+
+/// The row of somebody who is elsewhere.
+const IMAGE: u32 = u32::MAX;
 
 /// What somebody does in a step.
 #[derive(Debug, Clone, Copy, Default)]
@@ -38,7 +51,7 @@ pub struct Move {
     pub phi: f64,
     /// The next gate at its start.
     pub gate: u32,
-    /// Whether a gate is near its end, and whether one is crossed.
+    /// Whether a gate is near its end, and whether one or a link is crossed.
     pub near: bool,
     pub crosses: bool,
     /// Desired speed there [m/s].
@@ -50,16 +63,21 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
     people.iter_mut().for_each(|p| (p.started, p.lies) = (t >= p.starts || p.out.is_some(), t < p.up));
     let most = |f: fn(&Person) -> f64| people.iter().map(f).fold(0.0, f64::max);
     let range = model.reach(most(|p| p.speed), most(|p| p.radius));
-    let Scratch { near, sorted, own, moves } = scratch;
-    near.sort(0.5 * range, people.iter().map(|p| p.x));
-    sorted.resize(people.len(), Other::default());
-    own.resize(people.len(), Move::default());
+    let Scratch { images, near, sorted, own, moves } = scratch;
+    images.clear();
+    let linked = if floor.plan.passages().is_empty() { &[] } else { &*people };
+    images.extend(linked.iter().enumerate().flat_map(|(row, p)| {
+        let near = floor.plan.passages_near(p.x).filter(|passage| passage.is_near(p.x, range));
+        near.map(move |passage| Image { row: row as u32, passage: *passage, x: passage.place(p.x) })
+    }));
+    near.sort(0.5 * range, people.iter().map(|p| p.x).chain(images.iter().map(|image| image.x)));
+    sorted.resize(near.order.len(), Other::default());
+    own.resize(near.order.len(), Move::default());
     moves.resize(people.len(), Move::default());
-    let all = &*people;
+    let (all, images) = (&*people, &*images);
     sorted.chunks_mut(TASK).zip(near.order.chunks(TASK)).in_parallel(|(sorted, rows)| {
         for (other, row) in sorted.iter_mut().zip(rows) {
-            let p = &all[*row as usize];
-            *other = Other {
+            let seen = |p: &Person, row: u32| Other {
                 x: p.x,
                 radius: p.radius,
                 e: [cos(p.heading), sin(p.heading)],
@@ -67,17 +85,28 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
                 phi: p.phi,
                 lies: p.lies,
                 id: p.id,
-                row: *row,
+                row,
+            };
+            *other = match all.get(*row as usize) {
+                Some(p) => seen(p, *row),
+                None => {
+                    let Image { row, passage, x } = &images[*row as usize - all.len()];
+                    let p = seen(&all[*row as usize], IMAGE);
+                    Other { x: *x, e: passage.direction(p.e), v: passage.direction(p.v), ..p }
+                }
             };
         }
     });
     let (near, sorted) = (&*near, &*sorted);
     own.chunks_mut(TASK).zip(sorted.chunks(TASK)).in_parallel(|(own, part)| {
         // One after the other, so that looking up ways does not wait for itself.
-        let direction = |other: &Other| floor.way(all[other.row as usize].way).direction(other.x);
+        let direction = |other: &Other| match all.get(other.row as usize) {
+            Some(p) => floor.way(p.way).direction(other.x),
+            None => ([0.0; 2], NONE),
+        };
         let directions: Vec<(Point, u32)> = part.iter().map(direction).collect();
         let (mut others, mut planes) = (Vec::new(), Vec::new());
-        for ((to, me), direction) in own.iter_mut().zip(part).zip(directions) {
+        for ((to, me), direction) in own.iter_mut().zip(part).zip(directions).filter(|((_, me), _)| me.row != IMAGE) {
             let person = &all[me.row as usize];
             let mut over = false;
             others.clear();
@@ -103,7 +132,7 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
             *to = Move { gate, ..one(&around, floor.way(person.way), model, down, h, &mut planes) };
         }
     });
-    sorted.iter().zip(&*own).for_each(|(other, to)| moves[other.row as usize] = *to);
+    sorted.iter().zip(&*own).filter(|(other, _)| other.row != IMAGE).for_each(|(other, to)| moves[other.row as usize] = *to);
     people.iter_mut().zip(moves.iter()).for_each(|(p, to)| {
         p.x = along(p.x, 1.0, to.u);
         p.v = to.u.map(|u| u / h);
@@ -133,8 +162,10 @@ fn one(around: &Around<'_>, way: &Way, model: &Model, down: Point, h: f64, plane
         u = around.feasible(u, model.soft(), planes);
     }
     let to = along(me.x, 1.0, u);
-    let phi = me.out.map_or_else(|| way.distance(to), |out| me.phi - dot(u, out));
+    let passage = if me.out.is_none() { plan.passage(me.x, to) } else { None };
+    let end = passage.map_or(to, |passage| passage.arrival(me.x, to));
+    let phi = me.out.map_or_else(|| way.distance(end), |out| me.phi - dot(u, out));
     let gates = plan.gates_near(to);
-    let crosses = gates.iter().any(|g| crossing(plan.gates[*g as usize].line, me.x, to).is_some());
+    let crosses = passage.is_some() || gates.iter().any(|g| crossing(plan.gates[*g as usize].line, me.x, to).is_some());
     Move { u, heading, phi, gate: NONE, near: !gates.is_empty(), crosses, free: around.speed }
 }

@@ -1,5 +1,7 @@
 //! The plan of a floor: walls without thickness and gates across openings, with a list of the walls near every place.
 
+use super::link::Passage;
+
 /// A place on the floor, or a direction.
 pub type Point = [f64; 2];
 
@@ -127,6 +129,10 @@ pub struct Plan {
     near_walls: Lists,
     /// Gates within 1 m.
     near_gates: Lists,
+    /// Ways through links between floors.
+    passages: Vec<Passage>,
+    /// Those within reach.
+    near_passages: Lists,
     /// How far lists of walls reach [m].
     reach: f64,
 }
@@ -156,20 +162,31 @@ impl Plan {
         let (low, high) = ([bound(0, f64::min), bound(1, f64::min)], [bound(0, f64::max), bound(1, f64::max)]);
         let origin = [low[0] - MARGIN, low[1] - MARGIN];
         let cells = [0, 1].map(|a| ((high[a] - low[a] + 2.0 * MARGIN).ceil() as usize).max(1));
-        let lists = |lines: &[Line], reach: f64| {
-            let mut lists = Lists { starts: vec![0], all: Vec::new() };
-            for c in 0..cells[0] * cells[1] {
-                let middle = [origin[0] + (c % cells[0]) as f64 + 0.5, origin[1] + (c / cells[0]) as f64 + 0.5];
-                // Half the diagonal of a cell more.
-                let near = |line: &Line| length(sub(nearest(*line, middle), middle)) <= reach + 0.7072;
-                lists.all.extend((0..lines.len() as u32).filter(|i| near(&lines[*i as usize])));
-                lists.starts.push(lists.all.len() as u32);
-            }
-            lists
-        };
-        let near_walls = lists(&walls, reach);
-        let near_gates = lists(&gates.iter().map(|g| g.line).collect::<Vec<_>>(), 1.0);
-        Self { solid: walls.len(), walls, gates, slopes: Vec::new(), low, high, cells, origin, near_walls, near_gates, reach }
+        let mut plan = Self { solid: walls.len(), walls, gates, low, high, cells, origin, reach, ..Self::default() };
+        plan.near_walls = plan.lists(&plan.walls, reach);
+        plan.near_gates = plan.lists(&plan.gates.iter().map(|g| g.line).collect::<Vec<_>>(), 1.0);
+        plan.near_passages = plan.lists(&[], reach);
+        plan
+    }
+
+    /// For each cell the lines within reach of any place of it.
+    fn lists(&self, lines: &[Line], reach: f64) -> Lists {
+        let mut lists = Lists { starts: vec![0], all: Vec::new() };
+        for c in 0..self.cells[0] * self.cells[1] {
+            let middle = [self.origin[0] + (c % self.cells[0]) as f64 + 0.5, self.origin[1] + (c / self.cells[0]) as f64 + 0.5];
+            // Half the diagonal of a cell more.
+            let near = |line: &Line| length(sub(nearest(*line, middle), middle)) <= reach + 0.7072;
+            lists.all.extend((0..lines.len() as u32).filter(|i| near(&lines[*i as usize])));
+            lists.starts.push(lists.all.len() as u32);
+        }
+        lists
+    }
+
+    /// The same with links between floors, each two lines that are one place.
+    pub fn with_links(mut self, links: &[[Line; 2]]) -> Self {
+        self.passages = links.iter().flat_map(|link| Passage::both(*link)).collect();
+        self.near_passages = self.lists(&self.passages.iter().map(|passage| passage.from).collect::<Vec<_>>(), self.reach);
+        self
     }
 
     /// The same with slopes, each the corners of a polygon, and what it is.
@@ -187,7 +204,8 @@ impl Plan {
     pub fn with_closed(&self, closed: &[bool]) -> Self {
         let lines = self.gates.iter().zip(closed).filter(|(_, closed)| **closed).map(|(gate, _)| gate.line);
         let walls = self.walls[..self.solid].iter().copied().chain(lines).collect();
-        Self { solid: self.solid, ..Self::new(walls, self.gates.clone(), self.reach).with_slopes(self.slopes.clone()) }
+        let (slopes, passages, near_passages) = (self.slopes.clone(), self.passages.clone(), self.near_passages.clone());
+        Self { solid: self.solid, slopes, passages, near_passages, ..Self::new(walls, self.gates.clone(), self.reach) }
     }
 
     /// The slope at a place.
@@ -203,6 +221,21 @@ impl Plan {
     /// Walls near a place.
     pub fn near(&self, x: Point) -> &[u32] {
         self.near_walls.of(self.cell(x))
+    }
+
+    /// All ways through links.
+    pub fn passages(&self) -> &[Passage] {
+        &self.passages
+    }
+
+    /// Ways through links that begin near a place.
+    pub fn passages_near(&self, x: Point) -> impl Iterator<Item = &Passage> {
+        self.near_passages.of(self.cell(x)).iter().map(|p| &self.passages[*p as usize])
+    }
+
+    /// The way through a link that leads from x to y, if one does.
+    pub fn passage(&self, x: Point, y: Point) -> Option<&Passage> {
+        self.passages_near(x).find(|passage| crossing(passage.from, x, y).is_some())
     }
 
     /// Gates within a metre of a place, and some more.

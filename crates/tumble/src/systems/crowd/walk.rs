@@ -112,12 +112,19 @@ impl Walk {
 
     /// What a step meant to somebody: what was crossed, whether a leg of the journey ends, and the time that was lost.
     fn arrive(&mut self, i: usize, to: &Move, t: f64, h: f64) -> Option<Share> {
-        let (p, (x, phi)) = (&mut self.people[i], self.before[i]);
+        let (p, (mut x, phi)) = (&mut self.people[i], self.before[i]);
         let legs = &self.journeys[p.crowd as usize];
         // Time taken, and distance left on the leg that the step began on.
         let (mut took, mut left) = (h, to.phi);
         p.phi = to.phi;
-        let crossings = if to.crosses { self.tally.cross(&self.floor, x, p.x, t, h) } else { Vec::new() };
+        let mut crossings = if to.crosses { self.tally.cross(&self.floor, x, p.x, t, h) } else { Vec::new() };
+        if to.crosses
+            && let Some(passage) = self.floor.plan.passage(x, p.x)
+        {
+            (x, p.x) = (passage.place(x), passage.arrival(x, p.x));
+            (p.v, p.slide, p.heading) = (passage.direction(p.v), passage.direction(p.slide), p.heading + passage.angle());
+            crossings.extend(self.tally.cross(&self.floor, x, p.x, t, h));
+        }
         for (s, g, e) in crossings {
             match &legs[p.leg as usize].goal {
                 Goal::Exits(exits) if exits.contains(&g) => {

@@ -4,6 +4,7 @@
 //!
 //! by fast sweeping, which visits cells in a fixed order. Source: [zhao2005]. On slopes a metre counts as much more as people are slower there.
 
+use super::link::{Passage, is_left};
 use super::plan::{Gate, Line, MARGIN, Plan, Point, Slope, along, dot, length, meets, nearest, sub};
 
 /// What a way leads to.
@@ -19,6 +20,8 @@ pub enum Target {
 const WALL: u32 = u32::MAX;
 /// No gate.
 pub const NONE: u32 = u32::MAX - 1;
+/// From here on links between cells that a passage crosses, by its number.
+const PASSAGE: u32 = 1 << 31;
 /// Over how many cells around an exit distances are exact.
 const EXACT: f64 = 3.0;
 /// Rounds of four sweeps, at most: each turn of a way takes one.
@@ -52,6 +55,17 @@ impl Grid {
         along(self.origin, self.side, [(i % self.n[0]) as f64 + 0.5, (i / self.n[0]) as f64 + 0.5])
     }
 
+    /// Columns, rows and weights of the four cells around a place.
+    fn weights(&self, x: Point) -> [([usize; 2], f64); 4] {
+        let split = |a: usize| {
+            let u = ((x[a] - self.origin[a]) / self.side - 0.5).clamp(0.0, (self.n[a] - 2) as f64);
+            let whole = u as usize;
+            (whole, u - whole as f64)
+        };
+        let ((i, s), (j, t)) = (split(0), split(1));
+        [([i, j], (1.0 - s) * (1.0 - t)), ([i + 1, j], s * (1.0 - t)), ([i, j + 1], (1.0 - s) * t), ([i + 1, j + 1], s * t)]
+    }
+
     /// Cells in the box around a line, and so far around.
     pub fn around(self, line: Line, far: f64) -> impl Iterator<Item = usize> {
         let range = |a: usize| {
@@ -69,10 +83,12 @@ pub struct Cells {
     grid: Grid,
     /// Whether the middle of a body may be there.
     open: Vec<bool>,
-    /// What the link to the next cell along x and along y crosses: a gate, a wall, or `NONE`.
+    /// What the link to the next cell along x and along y crosses: a gate, a passage, a wall, or `NONE`.
     links: [Vec<u32>; 2],
     /// The slope that each lies on; empty without slopes.
     slopes: Vec<Option<Slope>>,
+    /// Ways through links between floors.
+    passages: Vec<Passage>,
 }
 
 impl Cells {
@@ -80,12 +96,15 @@ impl Cells {
     pub fn new(plan: &Plan, side: f64, radius: f64) -> Self {
         let grid = Grid::of(plan, side);
         let all = grid.count();
-        let mut cells = Self { grid, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new() };
+        let mut cells = Self { grid, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new(), passages: plan.passages().to_vec() };
         if !plan.slopes.is_empty() {
             cells.slopes = (0..all).map(|i| plan.slope(grid.middle(i)).copied()).collect();
         }
         for (g, gate) in plan.gates.iter().enumerate() {
             cells.cut(gate.line, g as u32);
+        }
+        for (p, passage) in plan.passages().iter().enumerate() {
+            cells.cut(passage.from, PASSAGE + p as u32);
         }
         for wall in &plan.walls {
             cells.cut(*wall, WALL);
@@ -132,6 +151,18 @@ impl Cells {
         (link != WALL).then_some((j, link))
     }
 
+    /// The passage that a link between cells crosses.
+    fn passage(&self, link: u32) -> Option<&Passage> {
+        self.passages.get(link.wrapping_sub(PASSAGE) as usize)
+    }
+
+    /// Cells around a place beyond a passage, on the side that one comes to from cell i, with their weights.
+    fn beyond(&self, passage: &Passage, i: usize, x: Point) -> impl Iterator<Item = (usize, f64)> {
+        let (grid, to, left) = (self.grid, passage.to, !is_left(passage.from, self.grid.middle(i)));
+        let weights = grid.weights(x).map(|([i, j], w)| (i + j * grid.n[0], w));
+        weights.into_iter().filter(move |(j, w)| *w > 0.0 && is_left(to, grid.middle(*j)) == left)
+    }
+
     /// All four of them.
     fn neighbours(&self, i: usize) -> impl Iterator<Item = (usize, u32)> {
         [(0, false), (0, true), (1, false), (1, true)].into_iter().filter_map(move |(a, ahead)| self.neighbour(i, a, ahead))
@@ -172,13 +203,15 @@ struct Site {
     down: [f32; 2],
     /// The first gate on the way; `NONE` where there is none.
     next: u32,
+    /// Whether it is beside a line of a link.
+    cut: bool,
 }
 
 /// Distance, direction and next gate at every place.
 pub struct Way {
-    origin: Point,
-    side: f64,
-    n: [usize; 2],
+    grid: Grid,
+    /// Lines of links: what is beyond in the drawing is not what is beyond on the way.
+    cuts: Vec<Line>,
     /// In square tiles, so that neighbours along both axes are near in memory.
     sites: Vec<Site>,
 }
@@ -209,25 +242,31 @@ impl Way {
         way.widen(cells, radius);
         way.name_gates(cells);
         let tiles = cells.grid.n.map(|n| n.div_ceil(TILE));
-        let mut sites = vec![Site { phi: f64::INFINITY, down: [0.0; 2], next: NONE }; tiles[0] * tiles[1] * TILE * TILE];
+        let mut sites = vec![Site { phi: f64::INFINITY, down: [0.0; 2], next: NONE, cut: false }; tiles[0] * tiles[1] * TILE * TILE];
         for i in 0..all {
-            let site = Site { phi: way.phi[i], down: way.down(cells, i), next: way.next[i] };
+            let cut = cells.neighbours(i).any(|(_, link)| cells.passage(link).is_some());
+            let site = Site { phi: way.phi[i], down: way.down(cells, i), next: way.next[i], cut };
             sites[in_tiles(i % cells.grid.n[0], i / cells.grid.n[0], tiles[0])] = site;
         }
-        Self { origin: cells.grid.origin, side: cells.grid.side, n: cells.grid.n, sites }
+        Self { grid: cells.grid, cuts: plan.passages().iter().map(|passage| passage.from).collect(), sites }
     }
 
     /// The four cells around a place, with their weights.
-    fn around(&self, x: Point) -> [(&Site, f64); 4] {
-        let split = |a: usize| {
-            let u = ((x[a] - self.origin[a]) / self.side - 0.5).clamp(0.0, (self.n[a] - 2) as f64);
-            let whole = u as usize;
-            (whole, u - whole as f64)
-        };
-        let ((i, s), (j, t)) = (split(0), split(1));
-        let tiles = self.n[0].div_ceil(TILE);
-        let at = |p: usize, q: usize| &self.sites[in_tiles(i + p, j + q, tiles)];
-        [(at(0, 0), (1.0 - s) * (1.0 - t)), (at(1, 0), s * (1.0 - t)), (at(0, 1), (1.0 - s) * t), (at(1, 1), s * t)]
+    fn around(&self, x: Point) -> [(Site, f64); 4] {
+        let tiles = self.grid.n[0].div_ceil(TILE);
+        let weights = self.grid.weights(x);
+        let around = weights.map(|([i, j], w)| (self.sites[in_tiles(i, j, tiles)], w));
+        if around.iter().all(|(site, _)| !site.cut) {
+            return around;
+        }
+        // Distances go on to the place itself, and cells beyond a cut weigh nothing.
+        std::array::from_fn(|k| {
+            let ([i, j], w) = weights[k];
+            let middle = self.grid.middle(i + j * self.grid.n[0]);
+            let (mut site, _) = around[k];
+            site.phi -= dot(site.down.map(f64::from), sub(x, middle));
+            (site, if self.cuts.iter().any(|cut| meets(*cut, x, middle)) { 0.0 } else { w })
+        })
     }
 
     /// Distance to the target [m]; infinite where there is no way.
@@ -312,9 +351,19 @@ impl Solution {
         }
     }
 
+    /// The distance at a neighbour of cell i, which may lie beyond a passage.
+    fn at(&self, cells: &Cells, i: usize, (j, link): (usize, u32)) -> f64 {
+        let Some(passage) = cells.passage(link) else { return self.phi[j] };
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for (j, w) in cells.beyond(passage, i, passage.place(cells.grid.middle(j))).filter(|(j, _)| self.phi[*j] < f64::INFINITY) {
+            (sum, weight) = (sum + w * self.phi[j], weight + w);
+        }
+        if weight > 0.0 { sum / weight } else { f64::INFINITY }
+    }
+
     /// The distance of a cell from those of its neighbours.
     fn solve(&self, cells: &Cells, i: usize) -> f64 {
-        let at = |a, ahead| cells.neighbour(i, a, ahead).map_or(f64::INFINITY, |(j, _)| self.phi[j]);
+        let at = |a, ahead| cells.neighbour(i, a, ahead).map_or(f64::INFINITY, |to| self.at(cells, i, to));
         let sides = [0, 1].map(|a| [at(a, false), at(a, true)]);
         let [a, b] = sides.map(|[behind, ahead]| behind.min(ahead));
         if a.min(b) == f64::INFINITY {
@@ -342,7 +391,8 @@ impl Solution {
         for _ in 0..(radius / self.side).ceil() as usize + 1 {
             let before = self.phi.clone();
             for i in (0..before.len()).filter(|i| before[*i] == f64::INFINITY && !cells.open[*i]) {
-                self.phi[i] = cells.neighbours(i).map(|(j, _)| before[j] + BAND * self.side).fold(f64::INFINITY, f64::min);
+                let beside = cells.neighbours(i).filter(|(_, link)| cells.passage(*link).is_none());
+                self.phi[i] = beside.map(|(j, _)| before[j] + BAND * self.side).fold(f64::INFINITY, f64::min);
             }
         }
     }
@@ -353,7 +403,7 @@ impl Solution {
             return [0.0; 2];
         }
         let slope = |a: usize| {
-            let at = |ahead| cells.neighbour(i, a, ahead).map(|(j, _)| self.phi[j]).filter(|phi| phi.is_finite());
+            let at = |ahead| cells.neighbour(i, a, ahead).map(|to| self.at(cells, i, to)).filter(|phi| phi.is_finite());
             match (at(false), at(true)) {
                 (Some(low), Some(high)) => 0.5 * (high - low),
                 (None, Some(high)) => high - self.phi[i],
@@ -371,9 +421,17 @@ impl Solution {
         let mut order: Vec<usize> = (0..self.phi.len()).filter(|i| self.phi[*i] < f64::INFINITY && !self.exact[*i]).collect();
         order.sort_by(|a, b| self.phi[*a].total_cmp(&self.phi[*b]).then(a.cmp(b)));
         for i in order {
-            let lowest = cells.neighbours(i).min_by(|(a, _), (b, _)| self.phi[*a].total_cmp(&self.phi[*b]));
-            if let Some((j, link)) = lowest {
-                self.next[i] = if link == NONE { self.next[j] } else { link };
+            let lowest = |a: &(usize, u32), b: &(usize, u32)| self.at(cells, i, *a).total_cmp(&self.at(cells, i, *b));
+            if let Some((j, link)) = cells.neighbours(i).min_by(lowest) {
+                self.next[i] = match cells.passage(link) {
+                    None if link == NONE => self.next[j],
+                    None => link,
+                    Some(passage) => {
+                        let beyond = cells.beyond(passage, i, passage.place(cells.grid.middle(j)));
+                        let first = beyond.map(|(j, _)| j).min_by(|a, b| self.phi[*a].total_cmp(&self.phi[*b]));
+                        first.map_or(NONE, |j| self.next[j])
+                    }
+                };
             }
         }
     }

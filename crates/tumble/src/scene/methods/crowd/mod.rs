@@ -16,7 +16,7 @@ use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
 use tumble_interface::scene::{
-    Choice, Crowd, Gate as Words, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners, floor,
+    Choice, Crowd, FloorLink, Gate as Words, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners, floor,
 };
 use tumble_interface::{Issue, Warning};
 
@@ -52,6 +52,13 @@ fn gates(plan: &Floors) -> Vec<(String, Gate)> {
     };
     let doors = plan.door.iter().enumerate().map(|(k, door)| of("door", k, door, false));
     doors.chain(plan.exit.iter().enumerate().map(|(k, exit)| of("exit", k, exit, true))).collect()
+}
+
+/// Links between floors, with their places in the scene.
+fn links(plan: &Floors) -> Vec<(String, [Line; 2])> {
+    let scaled = |line: Line| line.map(|p| p.map(|x| x * plan.scale));
+    let link = |(k, link): (usize, &FloorLink)| (format!("plan \"{}\".link[{k}]", plan.name), [scaled(link.from), scaled(link.to)]);
+    plan.link.iter().enumerate().map(link).collect()
 }
 
 /// Areas of stairs and ramps, each with its place in the scene.
@@ -180,12 +187,35 @@ fn check_walls(thing: &Floors, issues: &mut Vec<Issue>) {
     }
 }
 
-/// Gates that nobody can pass, or that are nowhere.
+/// Links whose lines are not one place.
+fn check_links(thing: &Floors, issues: &mut Vec<Issue>) {
+    for (path, lines) in links(thing) {
+        let [from, to] = lines.map(|[a, b]| ((b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2)).sqrt());
+        if (from - to).abs() > 0.01 * from.max(to) {
+            let message = format!("{} m wide, and from {} m; the two lines are one place, draw them equally wide", short(to), short(from));
+            issues.push(Issue::new(format!("{path}.to"), message));
+        }
+    }
+}
+
+/// Gates and links that nobody can pass, or that are nowhere.
 fn check_gates(thing: &Floors, radius: f64, issues: &mut Vec<Issue>) {
-    let (all, walls) = (gates(thing), lines(&walls(thing)));
+    let names = gates(thing).into_iter().map(|(path, gate)| (path, gate.name));
+    let names: Vec<_> = names.chain(links(thing).into_iter().zip(&thing.link).map(|((path, _), link)| (path, link.name.clone()))).collect();
+    for (k, (path, name)) in names.iter().enumerate() {
+        if let Some((first, _)) = names[..k].iter().find(|(_, other)| other == name) {
+            issues.push(Issue::new(path, format!("\"{name}\" is the name of {first}, too; give it another")));
+        }
+    }
+    let both = links(thing).into_iter().zip(&thing.link).flat_map(|((path, lines), link)| {
+        ["from", "to"].into_iter().zip(lines).map(move |(key, line)| (format!("{path}.{key}"), link.name.clone(), line))
+    });
+    let all = gates(thing).into_iter().map(|(path, gate)| (path, gate.name, gate.line)).chain(both);
+    let walls = lines(&walls(thing));
     let bound = |a: usize, f: fn(f64, f64) -> f64| walls.iter().flatten().map(|p| p[a]).reduce(f);
-    for (k, (path, gate)) in all.iter().enumerate() {
-        let middle = [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
+    for (path, name, line) in all {
+        let middle = [0, 1].map(|a| 0.5 * (line[0][a] + line[1][a]));
+        let width = ((line[1][0] - line[0][0]).powi(2) + (line[1][1] - line[0][1]).powi(2)).sqrt();
         let clear = walls.iter().map(|wall| {
             let foot = nearest(*wall, middle);
             ((foot[0] - middle[0]).powi(2) + (foot[1] - middle[1]).powi(2)).sqrt()
@@ -195,26 +225,18 @@ fn check_gates(thing: &Floors, radius: f64, issues: &mut Vec<Issue>) {
             let beyond = |low: f64, high: f64| middle[a] < low - radius || middle[a] > high + radius;
             bound(a, f64::min).zip(bound(a, f64::max)).is_some_and(|(low, high)| beyond(low, high))
         });
-        if let Some((first, _)) = all[..k].iter().find(|(_, other)| other.name == gate.name) {
-            issues.push(Issue::new(path, format!("\"{}\" is the name of {first}, too; give it another", gate.name)));
-        }
         if outside {
-            issues.push(Issue::new(
-                path,
-                format!("\"{}\" at {} lies outside the walls; move it to an opening of them", gate.name, at(middle)),
-            ));
-        } else if gate.width() < 2.0 * radius {
+            issues.push(Issue::new(path, format!("\"{name}\" at {} lies outside the walls; move it to an opening of them", at(middle))));
+        } else if width < 2.0 * radius {
             let message = format!(
-                "nobody can pass: \"{}\" at {} is {} m wide, and the largest body {} m; widen it, or lower the radius",
-                gate.name,
+                "nobody can pass: \"{name}\" at {} is {} m wide, and the largest body {} m; widen it, or lower the radius",
                 at(middle),
-                short(gate.width()),
+                short(width),
                 short(2.0 * radius)
             );
             issues.push(Issue::new(path, message));
         } else if clear < radius {
-            let message =
-                format!("nobody can pass: a wall stands in \"{}\" at {}; end the wall at its jambs, or move it", gate.name, at(middle));
+            let message = format!("nobody can pass: a wall stands in \"{name}\" at {}; end the wall at its jambs, or move it", at(middle));
             issues.push(Issue::new(path, message));
         }
     }
@@ -304,7 +326,8 @@ fn check_places(thing: &Floors, issues: &mut Vec<Issue>) {
         }
     }
     for (k, waypoint) in thing.waypoint.iter().enumerate() {
-        let others = thing.door.iter().chain(&thing.exit).map(|gate| &gate.name).chain(thing.waypoint[..k].iter().map(|w| &w.name));
+        let others = thing.door.iter().chain(&thing.exit).map(|gate| &gate.name).chain(thing.link.iter().map(|link| &link.name));
+        let others = others.chain(thing.waypoint[..k].iter().map(|w| &w.name));
         if others.into_iter().any(|name| *name == waypoint.name) {
             let path = format!("plan \"{}\".waypoint[{k}]", thing.name);
             issues.push(Issue::new(path, format!("\"{}\" is the name of something else, too; give it another", waypoint.name)));
@@ -357,6 +380,7 @@ impl MethodRules for Rules {
                 check_places(thing, issues);
                 check_walls(thing, issues);
                 check_gates(thing, radius, issues);
+                check_links(thing, issues);
                 if thing.exit.is_empty() {
                     issues.push(Issue::new(
                         format!("plan \"{}\".exit", thing.name),
@@ -425,7 +449,8 @@ impl MethodRules for Rules {
         let radius = crowds.iter().map(|crowd| largest(crowd)).fold(0.05, f64::max);
         let fastest = crowds.iter().map(|crowd| top_speed(crowd)).fold(0.0, f64::max);
         let timed = gates.iter().any(|gate| gate.hours != [None; 2]);
-        let walls = Walls::new(lines(&walls(thing)), gates, model.reach(fastest, radius)).with_slopes(slopes(thing));
+        let links: Vec<[Line; 2]> = links(thing).into_iter().map(|(_, lines)| lines).collect();
+        let walls = Walls::new(lines(&walls(thing)), gates, model.reach(fastest, radius)).with_slopes(slopes(thing)).with_links(&links);
         // People have a way if they have one while all is open.
         let side = side(&crowds);
         let open = timed.then(|| Floor::new(walls.clone().without_hours(), targets.clone(), side, radius));
