@@ -285,3 +285,47 @@ WKT = "\n".join(
         "start POLYGON ((0.5 0.5, 5 0.5, 5 3.5, 0.5 3.5, 0.5 0.5))",
     ]
 )
+
+# The upper floor of 5 m x 3 m lies to the right of the lower one; a flight of stairs of 1.2 m leads from one to the other.
+FLOORS = """LINESTRING (5 0.9, 5 0, 0 0, 0 0.9)
+LINESTRING (0 2.1, 0 3, 5 3, 5 2.1)
+LINESTRING (10 2.1, 10 3, 15 3, 15 0, 10 0, 10 0.9)
+exit "out" LINESTRING (0 0.9, 0 2.1)
+door "stairs head" LINESTRING (10 0.9, 10 2.1)
+LINESTRING (5 0.9, 6.5 0.9, 6.5 2.1, 5 2.1)
+LINESTRING (10 0.9, 8.5 0.9, 8.5 2.1, 10 2.1)
+start POLYGON ((11 0.5, 14 0.5, 14 2.5, 11 2.5, 11 0.5))
+"""
+LINK = 'link "stairs" LINESTRING (6 0.9, 6 2.1)\nlink "stairs" LINESTRING (9 2.1, 9 0.9)\n'
+
+
+def test_people_of_an_upper_floor_leave_by_the_lower(tmp_path: Path) -> None:
+    file, out = tmp_path / "floors.wkt", tmp_path / "out"
+    command = ["bottlenecks", str(file), "--seeds", "1", "--people", "8", "--out", str(out)]
+    file.write_text(FLOORS)
+    refused = CliRunner().invoke(application(), command)
+    assert refused.exit_code == 2 and "no way leads from there to an exit" in refused.output
+    file.write_text(FLOORS + LINK)
+    ran = CliRunner().invoke(application(), command)
+    assert ran.exit_code == 0, ran.output
+    rows = (out / "bottlenecks.csv").read_text().splitlines()
+    crossed = {row.split(",")[1]: float(row.split(",")[4]) for row in rows[1:]}
+    assert crossed == {"stairs head": 8.0, "out": 8.0}
+
+
+def test_a_mended_plan_in_millimetres_keeps_all_that_is_on_it(tmp_path: Path) -> None:
+    file = tmp_path / "floors.wkt"
+    file.write_text(FLOORS + LINK)
+    found = words(file, people=8)
+    (plan,) = found["plan"]
+    large = json.loads(
+        json.dumps(plan), parse_float=lambda text: 1000 * float(text), parse_int=lambda text: 1000 * int(text)
+    )
+    stairs = {"area": [[5000, 900], [6000, 2100]], "up": [1, 0]}
+    place = {"name": "desk", "at": [13000, 1500]}
+    plan = large | {"scale": 0.001, "stairs": [stairs], "waypoint": [place]}
+    new = check.mended(Scene(found | {"plan": [plan]}))[0].to_dict()["plan"][0]
+    assert new["scale"] == 1.0
+    assert new["link"][0]["to"] == [pytest.approx([9.0, 0.9]), pytest.approx([9.0, 2.1])]
+    assert new["stairs"][0]["area"] == [pytest.approx([5.0, 0.9]), pytest.approx([6.0, 2.1])]
+    assert new["waypoint"][0]["at"] == pytest.approx([13.0, 1.5]) and new["waypoint"][0]["radius"] == 1.0

@@ -32,6 +32,7 @@ BEGINNINGS = {
     "coupled/washing": 5,
     "crowd/ceiling": 100,
     "crowd/office": 800,
+    "crowd/school": 400,
     "drape/clamped-sheet": 32,
     "drape/sheet-on-ball": 16,
     "drape/sheet-on-bunny": 4,

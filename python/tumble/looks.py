@@ -39,8 +39,8 @@ class Look:
     """Radius of points and curves [m], where points have none of their own."""
     trail: float = 0.0
     """How long points leave a trail behind them [s]."""
-    period: float | None = None
-    """Side of a square that repeats itself [m], which points leave on one side and enter on the other."""
+    leap: float | None = None
+    """A step farther than this [m] is none: points leave a periodic square and enter it again, people change floors."""
     plane: tuple[Point, Point] | None = None
     """A point and the unit normal of a ground, where it is not turned or moved."""
     strands: int = 1

@@ -45,6 +45,7 @@ const AT: Record<string, number> = {
   "crowd/bottleneck": 200,
   "crowd/ceiling": 72,
   "crowd/office": 240,
+  "crowd/school": 250,
   "integrators/overshoot": 5,
   "liquid/dam": 16,
   "liquid/bath": 8,

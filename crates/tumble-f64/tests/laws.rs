@@ -15,6 +15,7 @@ mod compressible;
 mod conservation;
 mod coupling;
 mod crowd_journeys;
+mod crowd_links;
 mod crowd_models;
 mod crowds;
 mod damping;

@@ -66,8 +66,8 @@ pub struct Look {
     pub radius: f64,
     /// How long points leave a trail behind them [s].
     pub trail: f64,
-    /// Side of a square that repeats itself [m], which points leave on one side and enter on the other.
-    pub period: Option<f64>,
+    /// A step farther than this [m] is none: points that leave a square on one side enter it on the other, and people change floors.
+    pub leap: Option<f64>,
     /// A point and the unit normal of a ground, where it is not turned or moved.
     pub plane: Option<[[f64; 3]; 2]>,
     /// Strands that are drawn for each that moves.
@@ -77,9 +77,9 @@ pub struct Look {
 }
 
 impl Look {
-    /// An object without trail, period and plane.
+    /// An object without trail, leap and plane.
     pub fn new(object: &str, form: Form, color: Rgb) -> Self {
-        Self { object: object.into(), form, color, radius: RADIUS, trail: 0.0, period: None, plane: None, strands: 1, few: false }
+        Self { object: object.into(), form, color, radius: RADIUS, trail: 0.0, leap: None, plane: None, strands: 1, few: false }
     }
 
     /// The same with another radius [m].

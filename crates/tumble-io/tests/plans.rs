@@ -207,6 +207,7 @@ fn floor() -> Floor {
             people: Some(20.0),
             exit: vec![],
         }],
+        link: vec![],
         radius: 0.18,
     }
 }
@@ -268,7 +269,7 @@ fn a_plan_of_many_lines_is_looked_at_quickly() {
         let (x, y) = (4.0 * (k % 100) as f64, 4.0 * (k / 200) as f64);
         if (k / 100).is_multiple_of(2) { vec![[x + 0.05, y], [x + 4.0, y]] } else { vec![[x, y + 0.05], [x, y + 4.0]] }
     };
-    let big = Floor { walls: (0..20_000).map(wall).collect(), door: vec![], exit: vec![], start: vec![], radius: 0.18 };
+    let big = Floor { walls: (0..20_000).map(wall).collect(), door: vec![], exit: vec![], start: vec![], link: vec![], radius: 0.18 };
     let begin = std::time::Instant::now();
     assert!(kinds(&big).contains(&"gap"));
     let (mended, _) = repair(&big);
@@ -313,7 +314,7 @@ proptest! {
                 let gates = |gates: &[tumble_io::plan::Gate]| gates.iter().enumerate().map(|(k, g)| Opening { name: format!("{k}"), from: metres(g.line[0]), to: metres(g.line[1]) }).collect();
                 let walls = plan.walls.iter().map(|wall| wall.iter().map(|p| metres(*p)).collect()).collect();
                 let start = plan.starts.iter().map(|a| Area { name: String::new(), points: a.points.iter().map(|p| metres(*p)).collect(), people: a.count, exit: vec![] });
-                let floor = Floor { walls, door: gates(&plan.doors), exit: gates(&plan.exits), start: start.collect(), radius: 0.18 };
+                let floor = Floor { walls, door: gates(&plan.doors), exit: gates(&plan.exits), start: start.collect(), link: vec![], radius: 0.18 };
                 lint(&floor);
                 let (mended, _) = repair(&floor);
                 prop_assert!(mended.walls.iter().flatten().flatten().all(|x| x.is_finite()));
@@ -329,4 +330,35 @@ proptest! {
             let _ = read(&bytes, format, &Options::default());
         }
     }
+}
+
+/// Two floors, the upper one drawn beside the lower: a name makes a pair, or a layer. The second line is drawn from its other end.
+#[test]
+fn lines_of_one_name_link_floors() {
+    let wkt = "wall LINESTRING (0 0, 0 3)\nlink \"stairs\" LINESTRING (4 0, 4 3)\nlink \"stairs\" LINESTRING (14 3, 14 0)\n";
+    let plan = read(wkt.as_bytes(), Format::Wkt, &Options::default()).unwrap();
+    assert_eq!(plan.faults, Vec::<String>::new());
+    assert_eq!(plan.links.len(), 1);
+    assert_eq!((plan.links[0].name.as_str(), plan.links[0].lines), ("stairs", [[[4.0, 0.0], [4.0, 3.0]], [[14.0, 0.0], [14.0, 3.0]]]));
+    let line = |layer: &str, x: f64| format!("0\nLINE\n8\n{layer}\n10\n{x}\n20\n0\n11\n{x}\n21\n3\n");
+    let all = [line("A-WALL", 0.0), line("LINK-1", 4.0), line("LINK-1", 14.0), line("LINK-2", 5.0)].concat();
+    let dxf = format!("0\nSECTION\n2\nENTITIES\n{all}0\nENDSEC\n0\nEOF\n");
+    let plan = read(dxf.as_bytes(), Format::Dxf, &Options::default()).unwrap();
+    assert_eq!(plan.links.iter().map(|link| link.name.as_str()).collect::<Vec<_>>(), ["LINK-1"]);
+    assert!(plan.faults[0].contains("\"LINK-2\" has 1 line, expected 2") && plan.faults.len() == 1, "{:?}", plan.faults);
+}
+
+/// A room without a door of its own is left by a link, and is locked without it.
+#[test]
+fn a_link_is_a_way_out() {
+    let mut plan = floor();
+    let room = |x: f64| vec![[x, 1.0], [x, 4.0], [x + 4.0, 4.0], [x + 4.0, 0.0], [x, 0.0]];
+    plan.walls.push(room(20.0));
+    plan.start[0].points = vec![[21.0, 0.5], [23.5, 0.5], [23.5, 3.5], [21.0, 3.5]];
+    plan.start[0].people = Some(10.0);
+    // A wall closes the room, and there is a link across it.
+    plan.walls.push(vec![[20.0, 0.0], [20.0, 1.0]]);
+    assert!(kinds(&plan).contains(&"locked"));
+    plan.link = vec![[[[3.0, 1.0], [3.0, 2.0]], [[22.0, 1.0], [22.0, 2.0]]]];
+    assert!(!kinds(&plan).contains(&"locked"));
 }

@@ -144,7 +144,7 @@ fn what_lies_on_grids_is_smoke_dye_or_an_image() {
 fn a_square_that_repeats_itself_is_told() {
     let text = "version = 1\ndimension = 2\n[[system]]\nname = \"s\"\nmethod = \"vicsek\"\n\
         vicsek = { side = 2.0, radius = 0.5, speed = 1.0, noise = 0.1 }\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n";
-    assert_eq!(looks(&scene(text)).objects[0].period, Some(2.0));
+    assert_eq!(looks(&scene(text)).objects[0].leap, Some(1.0));
 }
 
 #[test]

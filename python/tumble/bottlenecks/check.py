@@ -53,6 +53,7 @@ def floor(scene: Scene) -> dict[str, Any]:
         "walls": [metres(wall) for wall in plan["walls"]],
         "door": gates("door"),
         "exit": gates("exit"),
+        "link": [[metres(link["from"]), metres(link["to"])] for link in plan["link"]],
         "start": [_start(crowd) for crowd in tree["crowd"] if crowd["area"]],
         "radius": max((crowd["radius"] * (1.0 + crowd["radius_spread"]) for crowd in tree["crowd"]), default=0.2),
     }
@@ -79,8 +80,23 @@ def mended(scene: Scene) -> tuple[Scene, list[Fault]]:
     """The scene with its plan mended, in metres, and what was done."""
     new, done = _engine.repair_plan(floor(scene))
     tree = scene.to_dict()
-    plan = {**tree["plan"][0], "scale": 1.0, **{key: new[key] for key in ("walls", "door", "exit")}}
+    plan = _metres(tree["plan"][0]) | {key: new[key] for key in ("walls", "door", "exit")}
     return Scene({**tree, "plan": [plan]}, scene.folder or None), [_fault(one) for one in done]
+
+
+def _metres(plan: Tree) -> dict[str, Any]:
+    """A plan with the places of all that is on it in metres."""
+    scale = float(plan["scale"])
+
+    def scaled(x: Any) -> Any:
+        return [scaled(part) for part in x] if isinstance(x, list) else scale * x
+
+    places = {"waypoint": ("at",), "stairs": ("area",), "ramp": ("area",), "link": ("from", "to")}
+    moved = {
+        kind: [{**one, **{key: scaled(one[key]) for key in keys}} for one in plan[kind]]
+        for kind, keys in places.items()
+    }
+    return {**plan, **moved, "scale": 1.0}
 
 
 def _fault(one: Tree) -> Fault:
@@ -103,6 +119,8 @@ def picture(floor: Tree, found: Sequence[Fault]) -> bytes:
         for key, color in (("door", PALETTE[0]), ("exit", PALETTE[2])):
             for gate in floor[key]:
                 axes.plot(*np.array([gate["from"], gate["to"]]).T, color=color, linewidth=3.0)
+        for line in (line for link in floor["link"] for line in link):
+            axes.plot(*np.array(line).T, color=PALETTE[3], linewidth=2.0, linestyle="dotted")
         for k, fault in enumerate(found):
             for x, y in fault.places:
                 box = {

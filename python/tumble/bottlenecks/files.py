@@ -86,6 +86,7 @@ def scene(path: Path, reading: Reading) -> dict[str, Any]:
             {"name": gate["name"] or f"{kind} {k + 1}", "from": gate["line"][0], "to": gate["line"][1]}
             for k, gate in enumerate(found[f"{kind}s"])
         ]
+    plan["link"] = [{"name": link["name"], "from": link["lines"][0], "to": link["lines"][1]} for link in found["links"]]
     return {
         "version": 1,
         "title": path.stem,
@@ -111,7 +112,7 @@ def notes(path: Path, reading: Reading) -> list[str]:
         if layer["hidden"] and layer["holds"] and not layer["kind"]
     ]
     if found["stairs"]:
-        told.append(f"{found['stairs']} lines of stairs are left out: a plan is one floor")
+        told.append(f"{found['stairs']} lines of stairs are left out: they do not say where these rise")
     if any(found["origin"]):
         x, y = found["origin"]
         told.append(f"coordinates are counted from ({x:.15g}, {y:.15g}) of the drawing, which is far from 0")

@@ -159,7 +159,7 @@ def objects(run: Recording) -> list[Object]:
                 radius=look.radius,
                 trail=look.trail,
                 few=look.few,
-                leap=float("inf") if look.period is None else look.period / 2,
+                leap=float("inf") if look.leap is None else look.leap,
                 triangles=_indices(columns, "triangles", 3),
                 texture=np.asarray(columns["texture"]).reshape(-1, 2) if "texture" in columns else None,
                 links=_indices(columns, "links", 2),

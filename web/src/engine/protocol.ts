@@ -41,8 +41,8 @@ export interface Look {
   radius: number;
   /** How long points leave a trail behind them [s]. */
   trail: number;
-  /** Side of a square that repeats itself [m]. */
-  period: number | null;
+  /** A step farther than this is none [m]. */
+  leap: number | null;
   /** A point and the unit normal of a ground, where it is not turned or moved. */
   plane: [Vector, Vector] | null;
   strands: number;

@@ -203,7 +203,7 @@ export class Stage {
     this.past = past;
     this.frame = null;
     this.shades = new Shades();
-    for (const { object: name, form, color, radius, trail, period, plane, few } of info.looks.objects) {
+    for (const { object: name, form, color, radius, trail, leap, plane, few } of info.looks.objects) {
       const object = info.objects.find((o) => o.name === name);
       const topology = info.topology[name] ?? {};
       const thing: Thing = {
@@ -212,7 +212,7 @@ export class Stage {
         color,
         radius,
         trail,
-        leap: period ? period / 2 : Infinity,
+        leap: leap ?? Infinity,
         topology,
         grid: gridOf(topology),
         families: object ? familiesOf(info, object) : null,

@@ -14,11 +14,13 @@ pub enum Kind {
     Start,
     /// Steps.
     Stair,
+    /// A line where a floor goes on at another.
+    Link,
 }
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Self; 5] = [Self::Wall, Self::Door, Self::Exit, Self::Start, Self::Stair];
+    pub const ALL: [Self; 6] = [Self::Wall, Self::Door, Self::Exit, Self::Start, Self::Stair, Self::Link];
 
     /// Its name in words and options.
     pub fn name(self) -> &'static str {
@@ -28,6 +30,7 @@ impl Kind {
             Self::Exit => "exit",
             Self::Start => "start",
             Self::Stair => "stair",
+            Self::Link => "link",
         }
     }
 
@@ -38,7 +41,8 @@ impl Kind {
 }
 
 /// Words for kinds, lower case, without accents. A name with words of two kinds is of the first of them here: A-DOOR-EXIT is an exit.
-const WORDS: [(Kind, &str); 6] = [
+const WORDS: [(Kind, &str); 7] = [
+    (Kind::Link, "link links verbindung verbindungen liaison liaisons enlace enlaces collegamento collegamenti ligacao ligacoes"),
     (
         Kind::Exit,
         "exit exits egress ausgang ausgange ausgaenge notausgang notausgange sortie sorties salida salidas uscita uscite saida \
@@ -174,6 +178,7 @@ mod tests {
             ("Start area", Some(Kind::Start)),
             ("A-FLOR-STRS", Some(Kind::Stair)),
             ("Treppen", Some(Kind::Stair)),
+            ("link stairs west", Some(Kind::Link)),
             ("0", None),
             ("Defpoints", None),
             ("wallpaper", None),

@@ -75,6 +75,9 @@ pub struct Floor {
     pub exit: Vec<Opening>,
     /// Where they are at the start.
     pub start: Vec<Area>,
+    /// Two lines each that are one place.
+    #[serde(default)]
+    pub link: Vec<[[Point; 2]; 2]>,
     /// Of the largest body.
     pub radius: f64,
 }
@@ -401,7 +404,7 @@ pub(super) fn gap(sides: &[Side], wall: usize, end: usize, x: Point, points: usi
 fn ways(floor: &Floor, sides: &[Side], found: &mut Findings) {
     let cells = Cells::new(floor, sides);
     let [low, high] = bounds(floor.walls.iter().flatten());
-    let reached: Vec<Vec<bool>> = floor.exit.iter().map(|gate| cells.reached(gate)).collect();
+    let reached: Vec<Vec<bool>> = floor.exit.iter().map(|gate| cells.reached(gate, &floor.link)).collect();
     for area in &floor.start {
         let middle = centre(&area.points);
         let own = cells.inside(&area.points);
@@ -505,22 +508,33 @@ impl Cells {
         all.map(|(x, y)| x + self.n[0] * y).filter(|k| self.free[*k] && within(*k)).collect()
     }
 
-    /// Cells from which an exit can be reached.
-    fn reached(&self, gate: &Opening) -> Vec<bool> {
-        let mut reached = vec![false; self.free.len()];
-        let mut queue = VecDeque::new();
+    /// Free cells at the middle of a line.
+    fn at(&self, line: [Point; 2]) -> Vec<usize> {
         let reach = 0.3_f64.max(1.5 * self.side);
-        let (middle, [nx, ny]) = (gate.middle(), self.n);
+        let middle = super::between(line[0], line[1], 0.5);
         let (from, to) = (self.of(middle.map(|x| x - reach)), self.of(middle.map(|x| x + reach)));
-        for y in from[1]..=to[1] {
-            for x in from[0]..=to[0] {
-                let k = x + nx * y;
-                if self.free[k] && distance(self.middle(k), middle) <= reach {
-                    reached[k] = true;
-                    queue.push_back(k);
-                }
-            }
+        let all = (from[1]..=to[1]).flat_map(|y| (from[0]..=to[0]).map(move |x| (x, y)));
+        let all = all.map(|(x, y)| x + self.n[0] * y);
+        all.filter(|k| self.free[*k] && distance(self.middle(*k), middle) <= reach).collect()
+    }
+
+    /// Cells from which an exit can be reached, across links.
+    fn reached(&self, gate: &Opening, links: &[[[Point; 2]; 2]]) -> Vec<bool> {
+        let mut reached = vec![false; self.free.len()];
+        self.spread(self.at(gate.line()), &mut reached);
+        let ways: Vec<[Vec<usize>; 2]> = links.iter().flat_map(|[a, b]| [[self.at(*a), self.at(*b)], [self.at(*b), self.at(*a)]]).collect();
+        let is = |cells: &[usize], reached: &[bool]| cells.iter().any(|k| reached[*k]);
+        while let Some([_, beyond]) = ways.iter().find(|[here, beyond]| is(here, &reached) && !beyond.is_empty() && !is(beyond, &reached)) {
+            self.spread(beyond.clone(), &mut reached);
         }
+        reached
+    }
+
+    /// Cells that are reached from some.
+    fn spread(&self, from: Vec<usize>, reached: &mut [bool]) {
+        from.iter().for_each(|k| reached[*k] = true);
+        let mut queue = VecDeque::from(from);
+        let [nx, ny] = self.n;
         while let Some(k) = queue.pop_front() {
             let (x, y) = (k % nx, k / nx);
             for ny in y.saturating_sub(1)..=(y + 1).min(ny - 1) {
@@ -533,6 +547,5 @@ impl Cells {
                 }
             }
         }
-        reached
     }
 }

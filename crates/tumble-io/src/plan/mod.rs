@@ -91,6 +91,15 @@ pub struct Gate {
     pub line: [Point; 2],
 }
 
+/// Two lines that are one place, on two floors that are drawn side by side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Link {
+    /// Theirs, or that of their layer.
+    pub name: String,
+    /// Both lines, in units of the file, their ends in the same order: of the two orders that which turns the floors less.
+    pub lines: [[Point; 2]; 2],
+}
+
 /// An area where people are at the start.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Start {
@@ -134,7 +143,9 @@ pub struct Plan {
     pub exits: Vec<Gate>,
     /// Where they are at the start.
     pub starts: Vec<Start>,
-    /// Lines of stairs: no floor has any yet.
+    /// Where floors go on at each other.
+    pub links: Vec<Link>,
+    /// Lines of stairs, which do not say where these rise.
     pub stairs: usize,
     /// What the file holds, by name.
     pub layers: Vec<Layer>,
@@ -271,9 +282,33 @@ fn sorted(drawing: Drawing, options: &Options) -> Plan {
     let exits = gates::gates(&of(Kind::Exit), Kind::Exit, &walls, &mut faults);
     let starts = of(Kind::Start).into_iter().filter_map(|shape| start(shape, &mut faults)).collect();
     let scale = options.scale.or(drawing.unit.as_ref().map(|unit| unit.1)).unwrap_or(1.0);
+    let names = |shape: &Shape| shape.name.clone().unwrap_or_else(|| drawing.tags[shape.tag].layer.clone());
+    let links = links(&of(Kind::Link), names, &mut faults);
     let stairs = of(Kind::Stair).len();
-    let plan = Plan { unit: drawing.unit, scale, origin: [0.0; 2], walls, doors, exits, starts, stairs, layers, faults };
+    let plan = Plan { unit: drawing.unit, scale, origin: [0.0; 2], walls, doors, exits, starts, links, stairs, layers, faults };
     near(plan)
+}
+
+/// Pairs of lines of one name.
+fn links(shapes: &[&Shape], name: impl Fn(&Shape) -> String, faults: &mut Vec<String>) -> Vec<Link> {
+    let mut pairs: BTreeMap<String, Vec<&Shape>> = BTreeMap::new();
+    shapes.iter().for_each(|shape| pairs.entry(name(shape)).or_default().push(shape));
+    let mut found = Vec::new();
+    for (name, lines) in pairs {
+        let ends = |shape: &Shape| shape.points.first().copied().zip(shape.points.last().copied());
+        let [Some((a, b)), Some((c, d))] = lines.iter().copied().map(ends).collect::<Vec<_>>()[..] else {
+            let n = lines.len();
+            faults.push(format!(
+                "{}: link {name:?} has {n} line{}, expected 2, one on each floor; give the two that are one place the same name, or a layer of their own",
+                lines[0].place,
+                if n == 1 { "" } else { "s" }
+            ));
+            continue;
+        };
+        let to = if dot(sub(b, a), sub(d, c)) < 0.0 { [d, c] } else { [c, d] };
+        found.push(Link { name, lines: [[a, b], to] });
+    }
+    found
 }
 
 /// What the file holds, layer by layer.
@@ -344,6 +379,7 @@ fn near(mut plan: Plan) -> Plan {
     let shift = |p: &mut Point| *p = [p[0] - origin[0], p[1] - origin[1]];
     plan.walls.iter_mut().flatten().for_each(shift);
     plan.doors.iter_mut().chain(&mut plan.exits).flat_map(|gate| &mut gate.line).for_each(shift);
+    plan.links.iter_mut().flat_map(|link| link.lines.as_flattened_mut()).for_each(shift);
     plan.starts.iter_mut().flat_map(|start| &mut start.points).for_each(shift);
     Plan { origin, ..plan }
 }

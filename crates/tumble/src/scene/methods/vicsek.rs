@@ -62,9 +62,9 @@ impl MethodRules for Rules {
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
-        let period = plan.vicsek.as_ref().map(|words| words.side);
+        let leap = plan.vicsek.as_ref().map(|words| 0.5 * words.side);
         let own = scene.particles.iter().filter(|t| is_in(&t.system, plan));
-        own.map(|t| Look { period, ..particles(t, colors) }).collect()
+        own.map(|t| Look { leap, ..particles(t, colors) }).collect()
     }
 
     /// Particles are counted as masses.

@@ -94,6 +94,11 @@ impl Floor {
         Grid::of(&self.open, self.sizes[0]).count()
     }
 
+    /// Places of lines of links that people get to from both sides, given where they start.
+    pub fn both_sides(&self, starts: impl Iterator<Item = Point>) -> Vec<Point> {
+        Cells::new(&self.open, self.sizes[0], self.sizes[1]).both_sides(&self.open, starts)
+    }
+
     /// A plan on which the closed gates are walls, and the ways across it.
     fn replan(&mut self) {
         self.plan = self.open.with_closed(&self.closed);

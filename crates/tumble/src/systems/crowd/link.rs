@@ -43,6 +43,17 @@ impl Passage {
         crate::math::functions::atan2(self.turn[1], self.turn[0])
     }
 
+    /// The middle of the line that is crossed.
+    pub fn middle(&self) -> Point {
+        middle(self.from)
+    }
+
+    /// Places so far to the left and to the right of it [m].
+    pub fn sides(&self, far: f64) -> [Point; 2] {
+        let d = sub(self.from[1], self.from[0]);
+        [far, -far].map(|far| along(self.middle(), far / length(d), [-d[1], d[0]]))
+    }
+
     /// A direction beyond it.
     pub fn direction(&self, v: Point) -> Point {
         [self.turn[0] * v[0] - self.turn[1] * v[1], self.turn[1] * v[0] + self.turn[0] * v[1]]
@@ -123,9 +134,9 @@ mod tests {
     fn a_floor_that_is_drawn_in_two_pieces_is_walked_like_one() {
         // Nobody is as far from two others, of whom the order would choose one.
         let aside = |i: i32| [0.11 * f64::from(i * i % 5), 0.07 * f64::from(3 * i % 4)];
-        let places = |low: f64, y: f64| (0..6).map(move |i| along([low + 1.4 * f64::from(i / 3), y + 0.8 * f64::from(i % 3)], 1.0, aside(i)));
-        let meeting: Vec<(Point, usize)> =
-            places(0.7, 0.6).map(|x| (x, 1)).chain(places(9.9, 0.67).map(|x| (x, 0))).collect();
+        let places =
+            |low: f64, y: f64| (0..6).map(move |i| along([low + 1.4 * f64::from(i / 3), y + 0.8 * f64::from(i % 3)], 1.0, aside(i)));
+        let meeting: Vec<(Point, usize)> = places(0.7, 0.6).map(|x| (x, 1)).chain(places(9.9, 0.67).map(|x| (x, 0))).collect();
         let following: Vec<(Point, usize)> = places(2.7, 0.6).chain(places(5.0, 0.3)).map(|x| (x, 1)).collect();
         let shifted: fn(Point) -> Point = |[x, y]| [x + 20.0, y];
         let turned: fn(Point) -> Point = |[x, y]| [30.0 - y, x + 4.0];

@@ -96,7 +96,13 @@ impl Cells {
     pub fn new(plan: &Plan, side: f64, radius: f64) -> Self {
         let grid = Grid::of(plan, side);
         let all = grid.count();
-        let mut cells = Self { grid, open: vec![true; all], links: [vec![NONE; all], vec![NONE; all]], slopes: Vec::new(), passages: plan.passages().to_vec() };
+        let mut cells = Self {
+            grid,
+            open: vec![true; all],
+            links: [vec![NONE; all], vec![NONE; all]],
+            slopes: Vec::new(),
+            passages: plan.passages().to_vec(),
+        };
         if !plan.slopes.is_empty() {
             cells.slopes = (0..all).map(|i| plan.slope(grid.middle(i)).copied()).collect();
         }
@@ -166,6 +172,30 @@ impl Cells {
     /// All four of them.
     fn neighbours(&self, i: usize) -> impl Iterator<Item = (usize, u32)> {
         [(0, false), (0, true), (1, false), (1, true)].into_iter().filter_map(move |(a, ahead)| self.neighbour(i, a, ahead))
+    }
+
+    /// Places of lines of links that people get to from both sides, from where they start, by doors and links, but not by exits.
+    pub fn both_sides(&self, plan: &Plan, starts: impl Iterator<Item = Point>) -> Vec<Point> {
+        let cell = |x: Point| self.grid.weights(x).into_iter().fold(([0; 2], -1.0), |a, b| if b.1 > a.1 { b } else { a }).0;
+        let number = |x: Point| cell(x)[0] + cell(x)[1] * self.grid.n[0];
+        let mut reached = vec![false; self.open.len()];
+        let mut next: Vec<usize> = starts.map(number).collect();
+        while let Some(i) = next.pop() {
+            if !self.open[i] || std::mem::replace(&mut reached[i], true) {
+                continue;
+            }
+            for (j, link) in self.neighbours(i) {
+                let is_exit = plan.gates.get(link as usize).is_some_and(|gate| gate.exit);
+                match self.passage(link) {
+                    Some(passage) => next.extend(self.beyond(passage, i, passage.place(self.grid.middle(j))).map(|(j, _)| j)),
+                    None if !is_exit => next.push(j),
+                    None => {}
+                }
+            }
+        }
+        let is_reached = |x: Point| reached[number(x)];
+        let both = |passage: &&Passage| passage.sides(1.5 * self.grid.side).into_iter().all(is_reached);
+        plan.passages().iter().filter(both).map(Passage::middle).collect()
     }
 
     /// Floor [m²] within `far` of a gate and in sight of it, to its left and to its right.

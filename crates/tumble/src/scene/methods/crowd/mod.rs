@@ -16,7 +16,8 @@ use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look};
 use tumble_interface::scene::{
-    Choice, Crowd, FloorLink, Gate as Words, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners, floor,
+    Choice, Crowd, FloorLink, Gate as Words, Method, Plan as Floors, Plane, Preset, Scene, Steering, System as Plan, Walking, corners,
+    floor,
 };
 use tumble_interface::{Issue, Warning};
 
@@ -404,8 +405,12 @@ impl MethodRules for Rules {
         };
         let mut looks: Vec<Look> = floors.iter().map(wall).collect();
         let form = if flat(scene).is_some() { Form::Points } else { Form::Instances };
+        let middle = |[a, b]: Line| [0, 1].map(|k| 0.5 * (a[k] + b[k]));
+        let far = |[from, to]: [Line; 2]| (0..2).map(|k| (middle(to)[k] - middle(from)[k]).powi(2)).sum::<f64>().sqrt();
+        let leap = floors.iter().flat_map(|t| links(t)).map(|(_, lines)| 0.5 * far(lines)).reduce(f64::min);
         let people = |t: &&Crowd| Look {
             trail: t.trail,
+            leap,
             few: t.people() < FEW,
             ..Look::new(&t.name, form, colors.pick(t.color)).with_radius(t.radius)
         };
@@ -456,6 +461,16 @@ impl MethodRules for Rules {
         let open = timed.then(|| Floor::new(walls.clone().without_hours(), targets.clone(), side, radius));
         let floor = Floor::new(walls, targets, side, radius);
         let (people, arrivals) = fill(&crowds, thing, &journeys, &floor, open.as_ref().unwrap_or(&floor), scene.seed, &mut builder.issues);
+        let starts = people.iter().map(|p| p.x).chain(arrivals.iter().flat_map(|a| a.polygon.clone()));
+        let both = if thing.link.is_empty() { Vec::new() } else { floor.both_sides(starts) };
+        if let Some(x) = both.first() {
+            let message = format!(
+                "people get to both sides of the line at {}; each floor lies on one side of its line: close the walls around it, or swap the ends \
+                 of to, if the other floor lies on the wrong side",
+                at(*x)
+            );
+            builder.issues.push(Issue::new(format!("plan \"{}\".link", thing.name), message));
+        }
         let settings = Settings {
             name: plan.name.clone(),
             substeps: plan.substeps,
