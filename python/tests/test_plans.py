@@ -324,7 +324,9 @@ def test_a_mended_plan_in_millimetres_keeps_all_that_is_on_it(tmp_path: Path) ->
     stairs = {"area": [[5000, 900], [6000, 2100]], "up": [1, 0]}
     place = {"name": "desk", "at": [13000, 1500]}
     plan = large | {"scale": 0.001, "stairs": [stairs], "waypoint": [place]}
+    plan["door"] = [plan["door"][0] | {"opens": 5.0}]
     new = check.mended(Scene(found | {"plan": [plan]}))[0].to_dict()["plan"][0]
+    assert new["door"][0]["opens"] == 5.0
     assert new["scale"] == 1.0
     assert new["link"][0]["to"] == [pytest.approx([9.0, 0.9]), pytest.approx([9.0, 2.1])]
     assert new["stairs"][0]["area"] == [pytest.approx([5.0, 0.9]), pytest.approx([6.0, 2.1])]

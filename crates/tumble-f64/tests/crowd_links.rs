@@ -65,6 +65,38 @@ fn two_streams_pass_each_other_in_a_link_of_two_metres() {
 }
 
 #[test]
+fn people_come_down_two_floors_in_millimetres_by_timed_doors() {
+    // Three floors of 5 m x 2 m, drawn 10 m apart; those on the uppermost come one after the other.
+    let walls = "[[[5000, 0], [0, 0]], [[0, 2000], [5000, 2000]], [[5400, 0], [5400, 2000]], [[0, 10000], [5000, 10000]], \
+         [[0, 12000], [5000, 12000]], [[-400, 10000], [-400, 12000]], [[5400, 10000], [5400, 12000]], \
+         [[5000, 20000], [0, 20000], [0, 22000], [5000, 22000]], [[5400, 20000], [5400, 22000]]]";
+    let at = |x: f64, y: f64| [[x, y], [x, y + 2000.0]];
+    // The lower landing is turned round: whoever crosses it goes on in the other direction.
+    let stairs = link(at(5000.0, 0.0), [[5000.0, 12000.0], [5000.0, 10000.0]])
+        + &link(at(0.0, 10000.0), at(5000.0, 20000.0)).replace("stairs", "upper");
+    let gates = gate("exit", "out", [0.0, 0.0], [0.0, 2000.0])
+        + &gate("door", "half way", [2500.0, 10000.0], [2500.0, 12000.0])
+        + "opens = 10
+";
+    let words = plan(walls, &(gates + &stairs)).replace("walls =", "scale = 0.001
+walls =")
+        + &crowd("area = [[1, 20.3], [4, 21.7]]
+count = 12
+rate = 2");
+    let mut sim = scene(&words);
+    empty(&mut sim, 60.0, |sim| {
+        apart(sim);
+        assert!(sim.time() > 10.0 || sim.ledger().left.unwrap() == 0);
+    });
+    assert_eq!(gates_of(&sim), [12.0, 12.0]);
+}
+
+/// Crossings of all gates, from both sides together.
+fn gates_of(sim: &Simulation) -> Vec<f64> {
+    gates(sim, "crossings").chunks(2).map(|c| c[0] + c[1]).collect()
+}
+
+#[test]
 fn floors_have_the_same_bits_on_any_count_of_threads_and_after_a_restore() {
     let on = |threads: usize, at: Option<usize>| {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
@@ -102,6 +134,12 @@ fn links_that_are_none_are_refused_with_place_and_cure() {
         (floor(&link(from, to).replace("stairs", "door")), "plan \"floor\".link[0]", "\"door\" is the name of"),
         (floor(&link([[6.5, 2.9], [6.5, 3.1]], [[37.1, 6.5], [36.9, 6.5]])), "plan \"floor\".link[0].from", "nobody can pass"),
         (floor(&link(from, [[60.0, 6.5], [58.8, 6.5]])), "plan \"floor\".link[0].to", "lies outside the walls"),
+        (floor(&(link(from, to) + &gate("door", "second", [6.52, 2.4], [6.52, 3.6]))), "plan \"floor\".link[0].from", "move one of them"),
+        (
+            floor(&(link(from, to) + &link([[6.8, 2.4], [6.8, 3.6]], [[37.6, 6.8], [36.4, 6.8]]).replace("stairs", "second"))),
+            "plan \"floor\".link[1].from",
+            "nearer than 0.5 m",
+        ),
         // Its ends in the other order: people come out on the wrong side, and walk around the building.
         (floor(&link(from, [to[1], to[0]])), "plan \"floor\".link", "swap the ends of to"),
     ];

@@ -17,6 +17,7 @@ mod coupling;
 mod crowd_journeys;
 mod crowd_links;
 mod crowd_models;
+mod crowd_smoke;
 mod crowds;
 mod damping;
 mod densities;

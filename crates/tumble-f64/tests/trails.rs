@@ -25,7 +25,7 @@ fn turn(integrator: Integrator, n: u32, flat: Option<usize>) -> f64 {
     let mut exchange = Exchange::default();
     let (air, dust) = (exchange.enter("air"), exchange.enter("dust"));
     exchange.ask("air", "velocity");
-    exchange.turn(air).publish_field("air", "velocity", 0.0, &u);
+    exchange.turn(air).publish_field("air", "velocity", 0.0, || u.clone());
     let flow = Flow { fields: vec![Current::OnGrid(OnGrid { fluid: "air".into(), ..OnGrid::default() })], flat };
     let settings = Settings { name: "dust".into(), integrator, substeps: Some(n), step: None, adaptive: Default::default() };
     let start = [0.8, 0.0, -0.3];

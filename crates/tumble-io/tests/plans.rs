@@ -360,5 +360,7 @@ fn a_link_is_a_way_out() {
     plan.walls.push(vec![[20.0, 0.0], [20.0, 1.0]]);
     assert!(kinds(&plan).contains(&"locked"));
     plan.link = vec![[[[3.0, 1.0], [3.0, 2.0]], [[22.0, 1.0], [22.0, 2.0]]]];
-    assert!(!kinds(&plan).contains(&"locked"));
+    assert!(!kinds(&plan).contains(&"locked") && !kinds(&plan).contains(&"link"));
+    plan.link[0][1] = [[22.0, 1.0], [22.0, 2.2]];
+    assert!(kinds(&plan).contains(&"link"));
 }

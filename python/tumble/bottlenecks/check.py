@@ -21,7 +21,8 @@ class Fault:
     """Something that is wrong with a plan."""
 
     kind: str
-    """One word: size, outside, narrow, closed, crossed, jamb, double, crossing, sliver, gap, start, locked, full, unused."""
+    """One word: size, outside, narrow, closed, crossed, jamb, double, crossing, sliver, gap, link, start, locked, full,
+    unused."""
     fatal: bool
     """Whether nobody can walk on such a plan; others change what is measured."""
     places: tuple[tuple[float, float], ...]
@@ -80,7 +81,10 @@ def mended(scene: Scene) -> tuple[Scene, list[Fault]]:
     """The scene with its plan mended, in metres, and what was done."""
     new, done = _engine.repair_plan(floor(scene))
     tree = scene.to_dict()
-    plan = _metres(tree["plan"][0]) | {key: new[key] for key in ("walls", "door", "exit")}
+    plan = _metres(tree["plan"][0]) | {"walls": new["walls"]}
+    # A mended gate keeps its hours.
+    for key in ("door", "exit"):
+        plan[key] = [old | gate for old, gate in zip(plan[key], new[key], strict=True)]
     return Scene({**tree, "plan": [plan]}, scene.folder or None), [_fault(one) for one in done]
 
 

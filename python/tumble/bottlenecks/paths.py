@@ -4,6 +4,7 @@ Whoever leaves stands in no column any more. Its last way is continued by one fr
 """
 
 import io
+import math
 import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -69,9 +70,27 @@ def walked(scene: Scene, limit: float) -> Walk:
             break
         world.step()
     rows.sort()
+    rows = _parted(rows, _leap(tree["plan"][0]))
     numbers = np.array(rows, dtype=np.float64).reshape(-1, 4)
     ids = numbers[:, :2].astype(np.int64)
     return Walk(fps, ids[:, 0], ids[:, 1], np.ascontiguousarray(numbers[:, 2:]), outlines(tree["plan"][0]))
+
+
+def _leap(plan: Any) -> float:
+    """A step farther than this [m] leads through a link to another floor."""
+    middles = [[np.mean(np.array(link[key], float), axis=0) for key in ("from", "to")] for link in plan["link"]]
+    return min((0.5 * float(plan["scale"]) * math.dist(a, b) for a, b in middles), default=math.inf)
+
+
+def _parted(rows: list[tuple[int, int, float, float]], leap: float) -> list[tuple[int, int, float, float]]:
+    """Ways, sorted by person and frame, with a new person where one leaps to another floor: lines between there are not crossed."""
+    parted, new, last = [], max((row[0] for row in rows), default=0), (-1, -1)
+    for k, row in enumerate(rows):
+        if k and rows[k - 1][0] == row[0] and math.dist(rows[k - 1][2:], row[2:]) > leap:
+            new += 1
+            last = (row[0], new)
+        parted.append((last[1] if last[0] == row[0] else row[0], *row[1:]))
+    return sorted(parted)
 
 
 def outlines(plan: Any) -> tuple[Floats, ...]:

@@ -324,6 +324,11 @@ pub struct Walking {
     /// How long they lie. Default: 5 s.
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub rise_time: Option<f64>,
+    /// Name of a gas in whose smoke people walk: they are slower, and see less far.
+    pub smoke: Option<String>,
+    /// Extinction of light by that smoke, per mass. Default: 8700 m²/kg, of soot.
+    #[schemars(extend("x-unit" = "m²/kg", "exclusiveMinimum" = 0.0))]
+    pub extinction: Option<f64>,
     /// Energy of a blow that injures: they never rise. Default: 79 J.
     #[schemars(extend("x-unit" = "J", "exclusiveMinimum" = 0.0))]
     pub injury_energy: Option<f64>,

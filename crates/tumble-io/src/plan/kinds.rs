@@ -42,7 +42,6 @@ impl Kind {
 
 /// Words for kinds, lower case, without accents. A name with words of two kinds is of the first of them here: A-DOOR-EXIT is an exit.
 const WORDS: [(Kind, &str); 7] = [
-    (Kind::Link, "link links verbindung verbindungen liaison liaisons enlace enlaces collegamento collegamenti ligacao ligacoes"),
     (
         Kind::Exit,
         "exit exits egress ausgang ausgange ausgaenge notausgang notausgange sortie sorties salida salidas uscita uscite saida \
@@ -74,6 +73,8 @@ const WORDS: [(Kind, &str); 7] = [
         "wall walls partition partitions wand wande waende mauer mauern mur murs cloison cloisons pared paredes muro muros muri parete pareti \
          parede paredes tabique muur muren wanden vagg vaggar vaeg vegg vegger seina seinat sciana sciany stena steny стена стены 墙 壁",
     ),
+    // In German "links" is to the left.
+    (Kind::Link, "link enlace enlaces collegamento collegamenti ligacao ligacoes"),
 ];
 
 /// Ends of compounds, as in Innenwand. Of doors "tür" alone: Struktur is none.
@@ -178,7 +179,10 @@ mod tests {
             ("Start area", Some(Kind::Start)),
             ("A-FLOR-STRS", Some(Kind::Stair)),
             ("Treppen", Some(Kind::Stair)),
-            ("link stairs west", Some(Kind::Link)),
+            ("Link west", Some(Kind::Link)),
+            ("Wand links", Some(Kind::Wall)),
+            ("Tür links", Some(Kind::Door)),
+            ("Treppe Link", Some(Kind::Stair)),
             ("0", None),
             ("Defpoints", None),
             ("wallpaper", None),

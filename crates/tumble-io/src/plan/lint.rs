@@ -292,6 +292,31 @@ fn gates(floor: &Floor, sides: &[Side], found: &mut Findings) {
             jambs(sides, jamb, &named, floor.radius, found);
         }
     }
+    links(floor, sides, found);
+}
+
+/// Links that nobody can pass, or whose lines are not one place.
+fn links(floor: &Floor, sides: &[Side], found: &mut Findings) {
+    for [from, to] in &floor.link {
+        let [width, other] = [from, to].map(|line| distance(line[0], line[1]));
+        let middle = super::between(from[0], from[1], 0.5);
+        let named = format!("link at {}", at(middle));
+        if (width - other).abs() > 0.01 * width.max(other) {
+            let text = format!("{named} is {} m wide on one floor and {} m on the other", metres(width), metres(other));
+            found.add("link", true, vec![middle], text, "draw both lines equally wide", Cure::Drawing);
+        } else if width < 2.0 * floor.radius {
+            let text =
+                format!("{named} is {} m wide, and the largest body {} m: nobody can pass", metres(width), metres(2.0 * floor.radius));
+            found.add("narrow", true, vec![middle], text, "widen it, or lower the radius of the crowds", Cure::Drawing);
+        }
+        for line in [*from, *to] {
+            let named = format!("link at {}", at(super::between(line[0], line[1], 0.5)));
+            blocked(floor, sides, line, &named, found);
+            for jamb in line {
+                no_jamb(sides, jamb, &named, floor.radius, found);
+            }
+        }
+    }
 }
 
 /// Whether two lines are one, in either direction.
@@ -319,14 +344,22 @@ fn blocked(floor: &Floor, sides: &[Side], line: [Point; 2], named: &str, found: 
     }
 }
 
-/// A jamb without a wall.
-fn jambs(sides: &[Side], jamb: Point, named: &str, radius: f64, found: &mut Findings) {
+/// A jamb without a wall; else how far away the next is [m].
+fn no_jamb(sides: &[Side], jamb: Point, named: &str, radius: f64, found: &mut Findings) -> Option<f64> {
     let nearest = sides.iter().map(|side| off(side.line, jamb)).fold(f64::INFINITY, f64::min);
+    if nearest <= 2.0 * radius {
+        return Some(nearest);
+    }
+    let text = format!("{named} has no jamb at {}: the next wall is {} m away, and people walk past it", at(jamb), metres(nearest));
+    found.add("jamb", false, vec![jamb], text, "let it end at walls", Cure::Drawing);
+    None
+}
+
+/// A jamb without a wall, or where none ends.
+fn jambs(sides: &[Side], jamb: Point, named: &str, radius: f64, found: &mut Findings) {
+    let Some(nearest) = no_jamb(sides, jamb, named, radius, found) else { return };
     let corner = sides.iter().flat_map(|side| side.line).map(|x| distance(x, jamb)).fold(f64::INFINITY, f64::min);
-    if nearest > 2.0 * radius {
-        let text = format!("{named} has no jamb at {}: the next wall is {} m away, and people walk past it", at(jamb), metres(nearest));
-        found.add("jamb", false, vec![jamb], text, "let it end at walls", Cure::Drawing);
-    } else if corner > JAMB {
+    if corner > JAMB {
         let text = format!("{named}: no wall ends at its jamb {}, and --widen cannot move one", at(jamb));
         let by = if nearest <= TOUCH { Cure::Repair } else { Cure::Drawing };
         let cure = if by == Cure::Repair { "end a wall there, or --repair, which makes a corner of it" } else { "end a wall there" };

@@ -445,12 +445,12 @@ impl Turn<'_> {
         };
     }
 
-    /// Publishes a quantity of an object at time t [s], if anybody asks for it.
-    pub fn publish_field(&mut self, object: &str, quantity: &str, t: f64, value: &Vectors) {
+    /// Publishes a quantity of an object at time t [s], if anybody asks for it. A density has one part.
+    pub fn publish_field(&mut self, object: &str, quantity: &str, t: f64, value: impl FnOnce() -> Vectors) {
         let mut fields = self.exchange.fields.iter_mut();
         if let Some(field) = fields.find(|field| (field.object.as_str(), field.quantity.as_str()) == (object, quantity)) {
             field.states.retain(|(time, _)| *time < t);
-            field.states.push((t, Arc::new(value.clone())));
+            field.states.push((t, Arc::new(value())));
             let old = field.states.len().saturating_sub(2);
             field.states.drain(..old);
         }

@@ -23,6 +23,7 @@ use crate::system::System;
 use serde::Serialize;
 use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
 use tumble_interface::scene::{Emitter, Integrator, Method, Object, Particles, Scene, System as Plan};
+use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
@@ -241,6 +242,19 @@ fn on_grid(name: &str, scene: &Scene, density: f64, colors: &mut Colors) -> Look
         Some(_) => Look::new(name, Form::Image, colors.pick(None)),
         None => Look::new(name, Form::Smoke, if density < LIQUID { SMOKE } else { colors.pick(None) }),
     }
+}
+
+/// A warning for each of these gases whose system comes after that of this number, which reads it.
+pub fn late_carriers(scene: &Scene, index: usize, gases: &[String]) -> Vec<Warning> {
+    let late = |name: &String| {
+        let gas = scene.gas.iter().find(|gas| gas.name == *name)?;
+        let later = place(&scene.system, "gas", gas.system.as_deref()).filter(|later| *later > index)?;
+        let (own, other) = (&scene.system[index].name, &scene.system[later].name);
+        let message =
+            format!("comes before \"{other}\", whose gas acts on it, and sees it as it was at the beginning of each exchange; put it behind");
+        Some(Warning::new(Code::LateCarrier, format!("system \"{own}\""), message))
+    };
+    gases.iter().filter_map(late).collect()
 }
 
 /// The methods that move objects of the scene.

@@ -1,6 +1,6 @@
 //! Tracers: massless particles that velocity fields carry.
 
-use super::{MethodRules, emitted, is_in, particles, place, present, words_of_masses};
+use super::{MethodRules, emitted, is_in, late_carriers, particles, present, words_of_masses};
 use crate::geometry::Vector;
 use crate::recipes::Site;
 use crate::scene::Assets;
@@ -53,17 +53,7 @@ impl MethodRules for Rules {
             warnings.push(Warning::new(Code::IdleTracers, "", "tracers have no [[field]] to follow, and stay where they are; add one"));
         }
         for (index, plan) in scene.system.iter().enumerate().filter(|(_, plan)| plan.method == Method::Tracers) {
-            for of in fluids(scene) {
-                let carrier = scene.gas.iter().find(|gas| gas.name == *of);
-                let later = carrier.and_then(|gas| place(&scene.system, "gas", gas.system.as_deref())).filter(|later| *later > index);
-                if let Some(later) = later {
-                    let (own, other) = (&plan.name, &scene.system[later].name);
-                    let message = format!(
-                        "comes before \"{other}\", whose gas carries it, and sees it as it was at the beginning of each exchange; put it behind"
-                    );
-                    warnings.push(Warning::new(Code::LateCarrier, format!("system \"{own}\""), message));
-                }
-            }
+            warnings.extend(late_carriers(scene, index, &fluids(scene).cloned().collect::<Vec<_>>()));
         }
         warnings
     }

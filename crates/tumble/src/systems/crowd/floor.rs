@@ -1,6 +1,6 @@
 //! A plan with the ways across it, and which of its gates are open when.
 
-use super::plan::{Gate, Plan, Point};
+use super::plan::{Gate, Plan, Point, middle};
 use super::way::{Cells, Grid, Target, Way};
 
 /// How far from a gate people are near it [m].
@@ -94,9 +94,9 @@ impl Floor {
         Grid::of(&self.open, self.sizes[0]).count()
     }
 
-    /// Places of lines of links that people get to from both sides, given where they start.
-    pub fn both_sides(&self, starts: impl Iterator<Item = Point>) -> Vec<Point> {
-        Cells::new(&self.open, self.sizes[0], self.sizes[1]).both_sides(&self.open, starts)
+    /// Middles of lines of links that people get to from both sides, given where they start and areas to which they come.
+    pub fn both_sides(&self, starts: &[Point], areas: &[&[Point]]) -> Vec<Point> {
+        Cells::new(&self.open, self.sizes[0], self.sizes[1]).both_sides(&self.open, starts, areas)
     }
 
     /// A plan on which the closed gates are walls, and the ways across it.
@@ -110,8 +110,7 @@ impl Floor {
     fn find_ways(&mut self, mut cells: Cells) {
         let (plan, radius) = (&self.plan, self.sizes[1]);
         self.ways = self.targets.iter().map(|targets| Way::new(plan, &mut cells, targets, radius)).collect();
-        let middle = |gate: &Gate| [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
-        self.gates = self.ways.iter().map(|way| plan.gates.iter().map(|gate| way.distance(middle(gate))).collect()).collect();
+        self.gates = self.ways.iter().map(|way| plan.gates.iter().map(|gate| way.distance(middle(gate.line))).collect()).collect();
     }
 
     /// How many ways there are.

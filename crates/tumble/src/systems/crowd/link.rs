@@ -2,7 +2,8 @@
 //!
 //! The plane is cut along both lines and joined crosswise: whoever crosses one goes on beyond the other, and sees who is there.
 
-use super::plan::{Line, Point, along, cross, dot, length, nearest, sub};
+use super::around::Person;
+use super::plan::{Line, Plan, Point, along, cross, dot, length, meets, middle, nearest, sub};
 
 /// The way through a link from one of its lines to the other: the motion that lays the first on the second, end on end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,10 +22,6 @@ const ROUNDING: f64 = 1e-9;
 /// Whether a place is to the left of a line, or on it.
 pub fn is_left([a, b]: Line, x: Point) -> bool {
     cross(sub(b, a), sub(x, a)) >= 0.0
-}
-
-fn middle([a, b]: Line) -> Point {
-    [0, 1].map(|k| 0.5 * (a[k] + b[k]))
 }
 
 impl Passage {
@@ -71,9 +68,36 @@ impl Passage {
         along(self.place(y), away, [-d[1], d[0]])
     }
 
-    /// Whether a place is so near the line that is crossed.
-    pub fn is_near(&self, x: Point, reach: f64) -> bool {
-        length(sub(x, nearest(self.from, x))) < reach
+    /// The place of which x is the one beyond it.
+    pub fn before(&self, x: Point) -> Point {
+        let r = sub(x, middle(self.to));
+        along(middle(self.from), 1.0, [self.turn[0] * r[0] + self.turn[1] * r[1], self.turn[0] * r[1] - self.turn[1] * r[0]])
+    }
+}
+
+/// Somebody near a line of a link, as seen from beyond the other.
+#[derive(Debug)]
+pub struct Image {
+    /// The row of whom.
+    pub row: u32,
+    pub passage: Passage,
+    /// Where it seems to be.
+    pub x: Point,
+}
+
+/// Images of all who are so near a line of a link [m].
+pub fn images(people: &[Person], plan: &Plan, reach: f64) -> impl Iterator<Item = Image> {
+    let linked = if plan.passages().is_empty() { &[] } else { people };
+    linked.iter().enumerate().flat_map(move |(row, p)| {
+        let near = plan.passages_near(p.x).filter(move |passage| length(sub(p.x, nearest(passage.from, p.x))) < reach);
+        near.map(move |passage| Image { row: row as u32, passage: *passage, x: passage.place(p.x) })
+    })
+}
+
+impl Image {
+    /// Whether it is seen from a place: through the line, and past the walls around whom it is of, who is at x.
+    pub fn is_seen(&self, plan: &Plan, from: Point, x: Point) -> bool {
+        meets(self.passage.to, from, self.x) && plan.sees(plan.near(x), self.passage.before(from), x)
     }
 }
 
@@ -92,14 +116,17 @@ mod tests {
         let far = |x: Point| moved.map_or(x, |moved| moved(x));
         let cut = [[6.0, 0.0], [6.0, 3.0]];
         let halves = [[[0.0, 0.0], [6.0, 0.0]], [[0.0, 3.0], [6.0, 3.0]]];
-        let walls = halves.into_iter().chain(halves.map(|line| line.map(|[x, y]| far([x + 6.0, y])))).collect();
+        let mut walls: Vec<Line> = halves.into_iter().chain(halves.map(|line| line.map(|[x, y]| far([x + 6.0, y])))).collect();
+        // What lies beyond the cut in the drawing is another room.
+        walls.extend(moved.map(|_| [[6.4, -1.0], [6.4, 4.0]]));
         let gates = vec![exit("left", [[0.0, 0.0], [0.0, 3.0]]), exit("right", [[12.0, 0.0], [12.0, 3.0]].map(far))];
         let links: Vec<[Line; 2]> = moved.into_iter().map(|moved| [cut, cut.map(moved)]).collect();
         let (legs, targets) = journeys([0, 1].map(|exit| (vec![Goal::Exits(vec![exit])], false)).to_vec());
         let model = Model::CollisionFreeSpeed(CollisionFreeSpeed { time_gap: 0.65, buffer: 0.04 });
         let floor = Floor::new(Plan::new(walls, gates, 3.0).with_links(&links), targets, 0.1, 0.22);
         let person = |(id, (x, way)): (usize, &(Point, usize))| {
-            let x = if x[0] > 6.0 { far(*x) } else { *x };
+            let stands = id >= people.len();
+            let x = if x[0] > 6.0 && !stands { far(*x) } else { *x };
             let (_, phi) = legs[*way][0].shortest(&floor, x);
             let down = floor.way(*way as u32).direction(x).0;
             Person {
@@ -110,9 +137,9 @@ mod tests {
                 radius: 0.2,
                 speed: 1.2,
                 free: 1.2,
-                starts: 0.0,
+                starts: if stands { f64::INFINITY } else { 0.0 },
                 out: None,
-                started: true,
+                started: !stands,
                 slide: [0.0; 2],
                 up: 0.0,
                 lies: false,
@@ -122,14 +149,15 @@ mod tests {
                 way: *way as u32,
             }
         };
-        let people = people.iter().enumerate().map(person).collect();
-        let mut walk = Walk::new(floor, (model, None), legs, people, Vec::new());
+        let room = [0.7, 1.5, 2.3].map(|y| ([7.0, y], 0));
+        let everybody = people.iter().chain(if moved.is_some() { &room[..] } else { &[] }).enumerate().map(person).collect();
+        let mut walk = Walk::new(floor, (model, None, None), legs, everybody, Vec::new());
         (0..steps).for_each(|k| walk.step(0.05 * k as f64, 0.05));
-        walk.people.iter().map(|p| (p.id, p.x)).collect()
+        walk.people.iter().filter(|p| p.starts < 1.0).map(|p| (p.id, p.x)).collect()
     }
 
     /// Two streams that meet at the cut, and one that goes across it, walk as on a floor in one piece: all see each other across it, and have the
-    /// same ways.
+    /// same ways. Who stands beyond the cut in the drawing is seen by nobody.
     #[test]
     fn a_floor_that_is_drawn_in_two_pieces_is_walked_like_one() {
         // Nobody is as far from two others, of whom the order would choose one.

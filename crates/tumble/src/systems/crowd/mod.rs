@@ -14,6 +14,7 @@ mod near;
 mod people;
 mod place;
 mod plan;
+mod smoke;
 mod tally;
 mod touch;
 mod walk;
@@ -26,7 +27,8 @@ pub use floor::Floor;
 pub use journey::{Goal, Leg, journeys};
 pub use models::{AnticipationVelocity, CollisionFreeSpeed, Model, Orca, SocialForce};
 pub use place::{Misfit, Room, overlapping};
-pub use plan::{Gate, Line, Plan, Point, Slope, nearest};
+pub use plan::{Gate, Line, Plan, Point, Slope, middle, nearest, width};
+pub use smoke::Smoke;
 
 use crate::exchange::Turn;
 use crate::geometry::Vector;
@@ -58,6 +60,8 @@ pub struct Settings {
     pub model: Model,
     /// What people withstand, where there are bodies.
     pub frailty: Option<Frailty>,
+    /// The smoke that they walk in.
+    pub smoke: Option<Smoke>,
     /// Whether the scene is flat: elsewhere people stand in space.
     pub flat: bool,
     /// Mass of a person [kg].
@@ -83,7 +87,7 @@ impl Crowd {
     pub fn new(settings: Settings, floor: Floor, people: Vec<Person>, arrivals: Vec<Arrivals>) -> Self {
         let mut all: Vec<Person> = people.iter().chain(arrivals.iter().flat_map(|a| a.people.iter().map(|(_, p)| p))).copied().collect();
         all.sort_by_key(|p| p.id);
-        Self { walk: Walk::new(floor, (settings.model, settings.frailty), settings.journeys.clone(), people, arrivals), settings, all }
+        Self { walk: Walk::new(floor, (settings.model, settings.frailty, settings.smoke.clone()), settings.journeys.clone(), people, arrivals), settings, all }
     }
 
     /// Rows of a crowd.
@@ -124,6 +128,7 @@ impl System for Crowd {
         let n = given.max(equal_steps(dt * fastest.max(1e-9), FAR) as u32);
         let h = dt / f64::from(n);
         self.walk.bodies.begin(exchange);
+        self.walk.smoke.iter_mut().for_each(|smoke| smoke.take(exchange));
         for k in 0..n {
             if !go_on() {
                 return Ok(report);

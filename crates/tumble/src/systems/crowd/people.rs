@@ -3,10 +3,11 @@
 use super::around::{Around, Neighbour, Other, Person};
 use super::bodies::Bodies;
 use super::floor::Floor;
-use super::link::Passage;
+use super::link::{self, Image};
 use super::models::{Model, Motion};
 use super::near::Near;
-use super::plan::{Point, along, crossing, dot, sub};
+use super::plan::{Point, along, crossing, dot, length, sub};
+use super::smoke::{sight, slowed};
 use super::way::{NONE, Way};
 use crate::math::functions::{cos, sin};
 use crate::math::parallel::Tasks;
@@ -29,17 +30,6 @@ pub struct Scratch {
     pub moves: Vec<Move>,
 }
 
-/// Somebody near a line of a link, as seen from beyond the other.
-#[derive(Debug)]
-struct Image {
-    row: u32,
-    passage: Passage,
-    x: Point,
-}
-
-/// The row of somebody who is elsewhere.
-const IMAGE: u32 = u32::MAX;
-
 /// What somebody does in a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Move {
@@ -58,43 +48,38 @@ pub struct Move {
     free: f64,
 }
 
+/// What fills the room around people.
+pub struct Air<'a> {
+    /// Bodies among them.
+    pub bodies: &'a Bodies,
+    /// Extinction where each of them is, by row [1/m]; empty without smoke.
+    pub extinctions: &'a [f64],
+}
+
 /// One step of everybody, from t to t + h [s]. Distances left are not updated.
-pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies, scratch: &mut Scratch, t: f64, h: f64) {
+pub fn step(people: &mut [Person], floor: &Floor, model: &Model, air: &Air<'_>, scratch: &mut Scratch, t: f64, h: f64) {
     people.iter_mut().for_each(|p| (p.started, p.lies) = (t >= p.starts || p.out.is_some(), t < p.up));
     let most = |f: fn(&Person) -> f64| people.iter().map(f).fold(0.0, f64::max);
     let range = model.reach(most(|p| p.speed), most(|p| p.radius));
+    // Whoever can be touched in this step is felt.
+    let touched = 2.0 * (most(|p| p.radius) + h * most(|p| p.speed + length(p.slide)));
     let Scratch { images, near, sorted, own, moves } = scratch;
     images.clear();
-    let linked = if floor.plan.passages().is_empty() { &[] } else { &*people };
-    images.extend(linked.iter().enumerate().flat_map(|(row, p)| {
-        let near = floor.plan.passages_near(p.x).filter(|passage| passage.is_near(p.x, range));
-        near.map(move |passage| Image { row: row as u32, passage: *passage, x: passage.place(p.x) })
-    }));
+    images.extend(link::images(people, &floor.plan, range));
     near.sort(0.5 * range, people.iter().map(|p| p.x).chain(images.iter().map(|image| image.x)));
     sorted.resize(near.order.len(), Other::default());
     own.resize(near.order.len(), Move::default());
     moves.resize(people.len(), Move::default());
     let (all, images) = (&*people, &*images);
+    let image = |other: &Other| images.get((other.row as usize).wrapping_sub(all.len()));
     sorted.chunks_mut(TASK).zip(near.order.chunks(TASK)).in_parallel(|(sorted, rows)| {
         for (other, row) in sorted.iter_mut().zip(rows) {
-            let seen = |p: &Person, row: u32| Other {
-                x: p.x,
-                radius: p.radius,
-                e: [cos(p.heading), sin(p.heading)],
-                v: p.v,
-                phi: p.phi,
-                lies: p.lies,
-                id: p.id,
-                row,
-            };
-            *other = match all.get(*row as usize) {
-                Some(p) => seen(p, *row),
-                None => {
-                    let Image { row, passage, x } = &images[*row as usize - all.len()];
-                    let p = seen(&all[*row as usize], IMAGE);
-                    Other { x: *x, e: passage.direction(p.e), v: passage.direction(p.v), ..p }
-                }
-            };
+            *other = Other { row: *row, ..Other::default() };
+            let image = image(other);
+            let p = &all[image.map_or(*row, |image| image.row) as usize];
+            let (x, e, v) = (p.x, [cos(p.heading), sin(p.heading)], p.v);
+            let (x, e, v) = image.map_or((x, e, v), |Image { x, passage, .. }| (*x, passage.direction(e), passage.direction(v)));
+            *other = Other { x, radius: p.radius, e, v, phi: p.phi, lies: p.lies, id: p.id, row: *row };
         }
     });
     let (near, sorted) = (&*near, &*sorted);
@@ -106,15 +91,18 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
         };
         let directions: Vec<(Point, u32)> = part.iter().map(direction).collect();
         let (mut others, mut planes) = (Vec::new(), Vec::new());
-        for ((to, me), direction) in own.iter_mut().zip(part).zip(directions).filter(|((_, me), _)| me.row != IMAGE) {
+        for ((to, me), direction) in own.iter_mut().zip(part).zip(directions).filter(|((_, me), _)| image(me).is_none()) {
             let person = &all[me.row as usize];
+            let extinction = air.extinctions.get(me.row as usize).copied().unwrap_or(0.0);
+            let seen = range.min(sight(extinction).max(touched));
             let mut over = false;
             others.clear();
             for run in near.runs(me.x, range) {
                 for other in &sorted[run] {
                     let r = sub(other.x, me.x);
                     let d_sq = dot(r, r);
-                    if d_sq < range * range && other.id != me.id {
+                    let is_there = || image(other).is_none_or(|image| image.is_seen(&floor.plan, me.x, all[image.row as usize].x));
+                    if d_sq < seen * seen && other.id != me.id && is_there() {
                         let d = d_sq.sqrt();
                         if person.steps_over(other, d) {
                             over |= d < person.radius + other.radius;
@@ -125,14 +113,14 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, bodies: &Bodies
                 }
             }
             let (down, gate) = person.out.map_or(direction, |out| (out, NONE));
-            let pace = if over { OVER * person.speed } else { person.speed };
+            let pace = slowed(extinction) * if over { OVER * person.speed } else { person.speed };
             let speed = floor.plan.slope(me.x).map_or(pace, |slope| pace * slope.factor(down));
-            let (walls, bodies) = (floor.plan.near(me.x), bodies.of(me.row));
+            let (walls, bodies) = (floor.plan.near(me.x), air.bodies.of(me.row));
             let around = Around { me: person, e: me.e, speed, plan: &floor.plan, walls, bodies, others: &others };
             *to = Move { gate, ..one(&around, floor.way(person.way), model, down, h, &mut planes) };
         }
     });
-    sorted.iter().zip(&*own).filter(|(other, _)| other.row != IMAGE).for_each(|(other, to)| moves[other.row as usize] = *to);
+    sorted.iter().zip(&*own).filter(|(other, _)| image(other).is_none()).for_each(|(other, to)| moves[other.row as usize] = *to);
     people.iter_mut().zip(moves.iter()).for_each(|(p, to)| {
         p.x = along(p.x, 1.0, to.u);
         p.v = to.u.map(|u| u / h);

@@ -29,6 +29,16 @@ pub(super) fn length(a: Point) -> f64 {
 /// A line from one place to another.
 pub type Line = [Point; 2];
 
+/// The middle of a line.
+pub fn middle([a, b]: Line) -> Point {
+    [0, 1].map(|k| 0.5 * (a[k] + b[k]))
+}
+
+/// Length of a line [m].
+pub fn width([a, b]: Line) -> f64 {
+    length(sub(b, a))
+}
+
 /// The place on a line that is nearest to x.
 pub fn nearest([a, b]: Line, x: Point) -> Point {
     let d = sub(b, a);
@@ -74,7 +84,7 @@ pub struct Gate {
 impl Gate {
     /// Its width [m].
     pub fn width(&self) -> f64 {
-        length(sub(self.line[1], self.line[0]))
+        width(self.line)
     }
 
     /// Whether it is closed at t [s]: before it opens, and from when it closes. One that closes before it opens is open at the start.

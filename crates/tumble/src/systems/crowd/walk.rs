@@ -5,10 +5,12 @@ use super::arrivals::Arrivals;
 use super::bodies::{Bodies, Frailty};
 use super::floor::Floor;
 use super::journey::{Goal, Leg, choose};
+use super::link::{Image, images};
 use super::models::Model;
 use super::near::Near;
-use super::people::{Move, Scratch, step};
+use super::people::{Air, Move, Scratch, step};
 use super::plan::{Point, length, sub};
+use super::smoke::Smoke;
 use super::tally::{Share, Tally};
 use crate::math::parallel::max;
 
@@ -36,6 +38,8 @@ pub struct Walk {
     /// The bodies of others among people, and what people withstand, where there are any.
     pub bodies: Bodies,
     frailty: Option<Frailty>,
+    /// The smoke that they walk in, if any.
+    pub smoke: Option<Smoke>,
     scratch: Scratch,
     /// Places and distances left before a step.
     before: Vec<(Point, f64)>,
@@ -45,14 +49,14 @@ impl Walk {
     /// People on a floor.
     pub fn new(
         floor: Floor,
-        (model, frailty): (Model, Option<Frailty>),
+        (model, frailty, smoke): (Model, Option<Frailty>, Option<Smoke>),
         journeys: Vec<Vec<Leg>>,
         people: Vec<Person>,
         arrivals: Vec<Arrivals>,
     ) -> Self {
         let tally = Tally::new(floor.plan.gates.len());
         let (bodies, scratch, before) = (Bodies::default(), Scratch::default(), Vec::new());
-        Self { floor, model, journeys, arrivals, people, time: 0.0, lost: 0.0, tally, bodies, frailty, scratch, before }
+        Self { floor, model, journeys, arrivals, people, time: 0.0, lost: 0.0, tally, bodies, frailty, smoke, scratch, before }
     }
 
     /// A step of h [s] from t.
@@ -75,7 +79,9 @@ impl Walk {
         if let Some(frailty) = &self.frailty {
             self.bodies.meet(&mut self.people, frailty, t, h);
         }
-        step(&mut self.people, &self.floor, &self.model, &self.bodies, &mut self.scratch, t, h);
+        let extinctions = self.smoke.as_ref().map_or(Vec::new(), |smoke| smoke.extinctions(self.people.iter().map(|p| p.x)));
+        let air = Air { bodies: &self.bodies, extinctions: &extinctions };
+        step(&mut self.people, &self.floor, &self.model, &air, &mut self.scratch, t, h);
         self.bodies.advance(h);
         let moves = std::mem::take(&mut self.scratch.moves);
         let queues = self.tally.queues(&self.floor, &self.people, &moves, h);
@@ -188,13 +194,23 @@ impl Walk {
 
     /// The deepest overlap of two bodies, of which none lies, or of a body and a wall [m].
     pub fn deepest(&self) -> f64 {
-        let mut near = Near::default();
+        let (mut near, plan) = (Near::default(), &self.floor.plan);
         let range = 2.0 * self.people.iter().map(|p| p.radius).fold(0.0, f64::max);
-        near.sort(range.max(0.1), self.people.iter().map(|p| p.x));
+        let images: Vec<Image> = images(&self.people, plan, range).collect();
+        near.sort(range.max(0.1), self.people.iter().map(|p| p.x).chain(images.iter().map(|image| image.x)));
         let deepest = |p: &Person| {
-            let others = near.runs(p.x, range).flat_map(|run| &near.order[run]).map(|row| &self.people[*row as usize]);
-            let overlap = |o: &Person| if o.id == p.id || o.lies || p.lies { 0.0 } else { p.radius + o.radius - length(sub(o.x, p.x)) };
-            others.map(overlap).fold(p.radius - self.floor.plan.clearance(p.x), f64::max)
+            let other = |row: &u32| match images.get((*row as usize).wrapping_sub(self.people.len())) {
+                None => self.people.get(*row as usize).map(|o| (o, o.x)),
+                Some(image) => {
+                    let o = &self.people[image.row as usize];
+                    image.is_seen(plan, p.x, o.x).then_some((o, image.x))
+                }
+            };
+            let others = near.runs(p.x, range).flat_map(|run| &near.order[run]).filter_map(other);
+            let overlap = |(o, x): (&Person, Point)| {
+                if o.id == p.id || o.lies || p.lies { 0.0 } else { p.radius + o.radius - length(sub(x, p.x)) }
+            };
+            others.map(overlap).fold(p.radius - plan.clearance(p.x), f64::max)
         };
         max(self.people.len(), |range| self.people[range].iter().map(deepest).fold(0.0, f64::max)).max(0.0)
     }

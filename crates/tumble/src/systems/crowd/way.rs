@@ -5,7 +5,7 @@
 //! by fast sweeping, which visits cells in a fixed order. Source: [zhao2005]. On slopes a metre counts as much more as people are slower there.
 
 use super::link::{Passage, is_left};
-use super::plan::{Gate, Line, MARGIN, Plan, Point, Slope, along, dot, length, meets, nearest, sub};
+use super::plan::{Gate, Line, MARGIN, Plan, Point, Slope, along, dot, inside, length, meets, middle, nearest, sub};
 
 /// What a way leads to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,8 +162,9 @@ impl Cells {
         self.passages.get(link.wrapping_sub(PASSAGE) as usize)
     }
 
-    /// Cells around a place beyond a passage, on the side that one comes to from cell i, with their weights.
-    fn beyond(&self, passage: &Passage, i: usize, x: Point) -> impl Iterator<Item = (usize, f64)> {
+    /// What cell j beyond a passage is, as seen from its neighbour i: cells on the side that one comes to, with their weights.
+    fn beyond(&self, passage: &Passage, i: usize, j: usize) -> impl Iterator<Item = (usize, f64)> {
+        let x = passage.place(self.grid.middle(j));
         let (grid, to, left) = (self.grid, passage.to, !is_left(passage.from, self.grid.middle(i)));
         let weights = grid.weights(x).map(|([i, j], w)| (i + j * grid.n[0], w));
         weights.into_iter().filter(move |(j, w)| *w > 0.0 && is_left(to, grid.middle(*j)) == left)
@@ -174,12 +175,14 @@ impl Cells {
         [(0, false), (0, true), (1, false), (1, true)].into_iter().filter_map(move |(a, ahead)| self.neighbour(i, a, ahead))
     }
 
-    /// Places of lines of links that people get to from both sides, from where they start, by doors and links, but not by exits.
-    pub fn both_sides(&self, plan: &Plan, starts: impl Iterator<Item = Point>) -> Vec<Point> {
+    /// Middles of lines of links that people get to from both sides, from where they start and areas to which they come, by doors and links, but not
+    /// by exits.
+    pub fn both_sides(&self, plan: &Plan, starts: &[Point], areas: &[&[Point]]) -> Vec<Point> {
         let cell = |x: Point| self.grid.weights(x).into_iter().fold(([0; 2], -1.0), |a, b| if b.1 > a.1 { b } else { a }).0;
         let number = |x: Point| cell(x)[0] + cell(x)[1] * self.grid.n[0];
         let mut reached = vec![false; self.open.len()];
-        let mut next: Vec<usize> = starts.map(number).collect();
+        let within = |i: &usize| areas.iter().any(|area| inside(area, self.grid.middle(*i)));
+        let mut next: Vec<usize> = starts.iter().map(|x| number(*x)).chain((0..self.open.len()).filter(within)).collect();
         while let Some(i) = next.pop() {
             if !self.open[i] || std::mem::replace(&mut reached[i], true) {
                 continue;
@@ -187,7 +190,7 @@ impl Cells {
             for (j, link) in self.neighbours(i) {
                 let is_exit = plan.gates.get(link as usize).is_some_and(|gate| gate.exit);
                 match self.passage(link) {
-                    Some(passage) => next.extend(self.beyond(passage, i, passage.place(self.grid.middle(j))).map(|(j, _)| j)),
+                    Some(passage) => next.extend(self.beyond(passage, i, j).map(|(j, _)| j)),
                     None if !is_exit => next.push(j),
                     None => {}
                 }
@@ -218,8 +221,11 @@ pub fn in_sight(plan: &Plan, gate: &Gate, x: Point, far: f64) -> Option<usize> {
         return None;
     }
     // A jamb is no obstacle: the foot lies a little inside the opening.
-    let middle = [0, 1].map(|a| 0.5 * (gate.line[0][a] + gate.line[1][a]));
+    let middle = middle(gate.line);
     let foot = along(foot, 1e-3, sub(middle, foot));
+    if plan.passages_near(x).any(|passage| meets(passage.from, x, foot)) {
+        return None;
+    }
     let left = super::plan::cross(sub(gate.line[1], gate.line[0]), sub(x, gate.line[0])) >= 0.0;
     plan.sees_past_gates(plan.near(x), x, foot).then_some(usize::from(!left))
 }
@@ -290,13 +296,15 @@ impl Way {
             return around;
         }
         // Distances go on to the place itself, and cells beyond a cut weigh nothing.
-        std::array::from_fn(|k| {
+        let beside = std::array::from_fn(|k| {
             let ([i, j], w) = weights[k];
             let middle = self.grid.middle(i + j * self.grid.n[0]);
             let (mut site, _) = around[k];
             site.phi -= dot(site.down.map(f64::from), sub(x, middle));
             (site, if self.cuts.iter().any(|cut| meets(*cut, x, middle)) { 0.0 } else { w })
-        })
+        });
+        // On the line itself all are.
+        if beside.iter().all(|(_, w)| *w == 0.0) { around } else { beside }
     }
 
     /// Distance to the target [m]; infinite where there is no way.
@@ -385,7 +393,7 @@ impl Solution {
     fn at(&self, cells: &Cells, i: usize, (j, link): (usize, u32)) -> f64 {
         let Some(passage) = cells.passage(link) else { return self.phi[j] };
         let (mut sum, mut weight) = (0.0, 0.0);
-        for (j, w) in cells.beyond(passage, i, passage.place(cells.grid.middle(j))).filter(|(j, _)| self.phi[*j] < f64::INFINITY) {
+        for (j, w) in cells.beyond(passage, i, j).filter(|(j, _)| self.phi[*j] < f64::INFINITY) {
             (sum, weight) = (sum + w * self.phi[j], weight + w);
         }
         if weight > 0.0 { sum / weight } else { f64::INFINITY }
@@ -457,7 +465,7 @@ impl Solution {
                     None if link == NONE => self.next[j],
                     None => link,
                     Some(passage) => {
-                        let beyond = cells.beyond(passage, i, passage.place(cells.grid.middle(j)));
+                        let beyond = cells.beyond(passage, i, j);
                         let first = beyond.map(|(j, _)| j).min_by(|a, b| self.phi[*a].total_cmp(&self.phi[*b]));
                         first.map_or(NONE, |j| self.next[j])
                     }

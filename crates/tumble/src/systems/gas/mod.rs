@@ -114,7 +114,10 @@ impl System for Gas {
         for fluid in &mut self.fluids {
             // Values beyond the sides are in no snapshot.
             hold(&mut fluid.u, &fluid.settings.sides, t);
-            exchange.publish_field(&fluid.name, "velocity", t, &fluid.u);
+            exchange.publish_field(&fluid.name, "velocity", t, || fluid.u.clone());
+            if let Some(smoke) = &fluid.smoke {
+                exchange.publish_field(&fluid.name, "smoke", t, || Vectors { parts: vec![smoke.clone()] });
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 
 mod population;
 
-use super::{MethodRules, is_in, scheme_of_its_own};
+use super::{MethodRules, is_in, late_carriers, scheme_of_its_own};
 use crate::math::functions::exp;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -10,7 +10,7 @@ use crate::scene::laws::flat;
 use crate::system::System;
 use crate::systems::crowd::{
     AnticipationVelocity, CollisionFreeSpeed, Crowd as People, Floor, Frailty, Gate, Goal, Line, Model, Orca, Plan as Walls, Point,
-    Settings, Slope, SocialForce, journeys, nearest,
+    Settings, Slope, Smoke, SocialForce, journeys, middle, nearest, width,
 };
 use population::{fill, largest, smallest, top_speed};
 use tumble_interface::check::short;
@@ -21,12 +21,17 @@ use tumble_interface::scene::{
 };
 use tumble_interface::{Issue, Warning};
 
+/// Extinction of light by soot [m²/kg]. Source: [mulholland2000].
+const EXTINCTION: f64 = 8700.0;
 /// Mass of a person [kg].
 const MASS: f64 = 80.0;
 /// Bytes for a person: its row three times, and what a step needs.
 const PERSON: f64 = 600.0;
 /// Bytes for a cell of a floor, and for each way across it.
 const CELL: [f64; 2] = [9.0, 20.0];
+/// How near lines of links may be to gates [m], and to each other, since nobody crosses two in a step.
+const NEAR_LINK: f64 = 0.05;
+const FAR: f64 = 0.5;
 /// Side of a cell [m], at most, and over the smallest radius.
 const SIDE: [f64; 2] = [0.1, 0.6];
 /// Pieces of a wall that are compared with each other.
@@ -55,10 +60,12 @@ fn gates(plan: &Floors) -> Vec<(String, Gate)> {
     doors.chain(plan.exit.iter().enumerate().map(|(k, exit)| of("exit", k, exit, true))).collect()
 }
 
-/// Links between floors, with their places in the scene.
-fn links(plan: &Floors) -> Vec<(String, [Line; 2])> {
+/// Links between floors: places in the scene, names and lines.
+fn links(plan: &Floors) -> Vec<(String, String, [Line; 2])> {
     let scaled = |line: Line| line.map(|p| p.map(|x| x * plan.scale));
-    let link = |(k, link): (usize, &FloorLink)| (format!("plan \"{}\".link[{k}]", plan.name), [scaled(link.from), scaled(link.to)]);
+    let link = |(k, link): (usize, &FloorLink)| {
+        (format!("plan \"{}\".link[{k}]", plan.name), link.name.clone(), [scaled(link.from), scaled(link.to)])
+    };
     plan.link.iter().enumerate().map(link).collect()
 }
 
@@ -149,6 +156,24 @@ fn check_model(plan: &Plan, bodies: bool, issues: &mut Vec<Issue>) {
     }
 }
 
+/// Smoke of a gas that is none.
+fn check_smoke(scene: &Scene, plan: &Plan, issues: &mut Vec<Issue>) {
+    let Some(words) = &plan.crowd else { return };
+    let path = |word: &str| format!("system \"{}\".crowd.{word}", plan.name);
+    if words.extinction.is_some() && words.smoke.is_none() {
+        issues.push(Issue::new(path("extinction"), "of smoke, and no gas is named; set smoke to the name of one, or leave it out"));
+    }
+    let Some(name) = &words.smoke else { return };
+    let smoky: Vec<&str> = scene.gas.iter().filter(|gas| gas.smoke.is_some()).map(|gas| gas.name.as_str()).collect();
+    if !smoky.contains(&name.as_str()) {
+        let message = match &smoky[..] {
+            [] => format!("\"{name}\" is no gas with smoke; add a [[gas]] of this name with a table smoke"),
+            known => format!("\"{name}\" is no gas with smoke, expected one of {}", known.join(", ")),
+        };
+        issues.push(Issue::new(path("smoke"), message));
+    }
+}
+
 fn at(x: Point) -> String {
     format!("({}, {})", short(x[0]), short(x[1]))
 }
@@ -188,13 +213,31 @@ fn check_walls(thing: &Floors, issues: &mut Vec<Issue>) {
     }
 }
 
-/// Links whose lines are not one place.
+/// Distance of two lines [m].
+fn apart(v: Line, w: Line) -> f64 {
+    let ends = v.map(|x| (x, w)).into_iter().chain(w.map(|x| (x, v)));
+    let far = ends.map(|(x, line)| width([x, nearest(line, x)])).fold(f64::INFINITY, f64::min);
+    if cross(v, w).is_some() { 0.0 } else { far }
+}
+
+/// Links whose lines are not one place, or so near a gate or each other that a step crosses both.
 fn check_links(thing: &Floors, issues: &mut Vec<Issue>) {
-    for (path, lines) in links(thing) {
-        let [from, to] = lines.map(|[a, b]| ((b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2)).sqrt());
+    let ends = links(thing).into_iter().flat_map(|(path, _, lines)| ["from", "to"].map(|key| format!("{path}.{key}")).into_iter().zip(lines));
+    let ends: Vec<(String, Line)> = ends.collect();
+    for pair in ends.chunks_exact(2) {
+        let ([from, to], path) = ([width(pair[0].1), width(pair[1].1)], &pair[1].0);
         if (from - to).abs() > 0.01 * from.max(to) {
             let message = format!("{} m wide, and from {} m; the two lines are one place, draw them equally wide", short(to), short(from));
-            issues.push(Issue::new(format!("{path}.to"), message));
+            issues.push(Issue::new(path, message));
+        }
+    }
+    for (k, (path, line)) in ends.iter().enumerate() {
+        if let Some((_, gate)) = gates(thing).into_iter().find(|(_, gate)| apart(gate.line, *line) < NEAR_LINK) {
+            let message = format!("\"{}\" is nearer to it than {NEAR_LINK} m; move one of them along the way", gate.name);
+            issues.push(Issue::new(path, message));
+        }
+        if let Some((other, _)) = ends[..k].iter().find(|(_, other)| apart(*other, *line) < FAR) {
+            issues.push(Issue::new(path, format!("nearer than {FAR} m to {other}; move one of them along the way")));
         }
     }
 }
@@ -202,21 +245,20 @@ fn check_links(thing: &Floors, issues: &mut Vec<Issue>) {
 /// Gates and links that nobody can pass, or that are nowhere.
 fn check_gates(thing: &Floors, radius: f64, issues: &mut Vec<Issue>) {
     let names = gates(thing).into_iter().map(|(path, gate)| (path, gate.name));
-    let names: Vec<_> = names.chain(links(thing).into_iter().zip(&thing.link).map(|((path, _), link)| (path, link.name.clone()))).collect();
+    let names: Vec<_> = names.chain(links(thing).into_iter().map(|(path, name, _)| (path, name))).collect();
     for (k, (path, name)) in names.iter().enumerate() {
         if let Some((first, _)) = names[..k].iter().find(|(_, other)| other == name) {
             issues.push(Issue::new(path, format!("\"{name}\" is the name of {first}, too; give it another")));
         }
     }
-    let both = links(thing).into_iter().zip(&thing.link).flat_map(|((path, lines), link)| {
-        ["from", "to"].into_iter().zip(lines).map(move |(key, line)| (format!("{path}.{key}"), link.name.clone(), line))
+    let both = links(thing).into_iter().flat_map(|(path, name, lines)| {
+        ["from", "to"].into_iter().zip(lines).map(move |(key, line)| (format!("{path}.{key}"), name.clone(), line))
     });
     let all = gates(thing).into_iter().map(|(path, gate)| (path, gate.name, gate.line)).chain(both);
     let walls = lines(&walls(thing));
     let bound = |a: usize, f: fn(f64, f64) -> f64| walls.iter().flatten().map(|p| p[a]).reduce(f);
     for (path, name, line) in all {
-        let middle = [0, 1].map(|a| 0.5 * (line[0][a] + line[1][a]));
-        let width = ((line[1][0] - line[0][0]).powi(2) + (line[1][1] - line[0][1]).powi(2)).sqrt();
+        let (middle, width) = (middle(line), width(line));
         let clear = walls.iter().map(|wall| {
             let foot = nearest(*wall, middle);
             ((foot[0] - middle[0]).powi(2) + (foot[1] - middle[1]).powi(2)).sqrt()
@@ -376,6 +418,7 @@ impl MethodRules for Rules {
                 issues.push(Issue::new(format!("system \"{}\"", plan.name), message));
             }
             check_model(plan, !scene.body.is_empty(), issues);
+            check_smoke(scene, plan, issues);
             let radius = crowds.iter().map(|thing| largest(thing)).fold(0.0, f64::max);
             for thing in &floors {
                 check_places(thing, issues);
@@ -393,8 +436,10 @@ impl MethodRules for Rules {
         }
     }
 
-    fn hints(&self, _scene: &Scene) -> Vec<Warning> {
-        Vec::new()
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        let crowds = scene.system.iter().enumerate().filter(|(_, plan)| plan.method == Method::Crowd);
+        let smoke = |plan: &Plan| plan.crowd.as_ref().and_then(|words| words.smoke.clone()).into_iter().collect::<Vec<_>>();
+        crowds.flat_map(|(index, plan)| late_carriers(scene, index, &smoke(plan))).collect()
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
@@ -405,9 +450,7 @@ impl MethodRules for Rules {
         };
         let mut looks: Vec<Look> = floors.iter().map(wall).collect();
         let form = if flat(scene).is_some() { Form::Points } else { Form::Instances };
-        let middle = |[a, b]: Line| [0, 1].map(|k| 0.5 * (a[k] + b[k]));
-        let far = |[from, to]: [Line; 2]| (0..2).map(|k| (middle(to)[k] - middle(from)[k]).powi(2)).sum::<f64>().sqrt();
-        let leap = floors.iter().flat_map(|t| links(t)).map(|(_, lines)| 0.5 * far(lines)).reduce(f64::min);
+        let leap = floors.iter().flat_map(|t| links(t)).map(|(_, _, lines)| 0.5 * width(lines.map(middle))).reduce(f64::min);
         let people = |t: &&Crowd| Look {
             trail: t.trail,
             leap,
@@ -454,29 +497,32 @@ impl MethodRules for Rules {
         let radius = crowds.iter().map(|crowd| largest(crowd)).fold(0.05, f64::max);
         let fastest = crowds.iter().map(|crowd| top_speed(crowd)).fold(0.0, f64::max);
         let timed = gates.iter().any(|gate| gate.hours != [None; 2]);
-        let links: Vec<[Line; 2]> = links(thing).into_iter().map(|(_, lines)| lines).collect();
+        let links: Vec<[Line; 2]> = links(thing).into_iter().map(|(_, _, lines)| lines).collect();
         let walls = Walls::new(lines(&walls(thing)), gates, model.reach(fastest, radius)).with_slopes(slopes(thing)).with_links(&links);
         // People have a way if they have one while all is open.
         let side = side(&crowds);
         let open = timed.then(|| Floor::new(walls.clone().without_hours(), targets.clone(), side, radius));
         let floor = Floor::new(walls, targets, side, radius);
         let (people, arrivals) = fill(&crowds, thing, &journeys, &floor, open.as_ref().unwrap_or(&floor), scene.seed, &mut builder.issues);
-        let starts = people.iter().map(|p| p.x).chain(arrivals.iter().flat_map(|a| a.polygon.clone()));
-        let both = if thing.link.is_empty() { Vec::new() } else { floor.both_sides(starts) };
+        let starts: Vec<Point> = people.iter().map(|p| p.x).collect();
+        let areas: Vec<&[Point]> = arrivals.iter().map(|a| &a.polygon[..]).collect();
+        let both = if thing.link.is_empty() { Vec::new() } else { floor.both_sides(&starts, &areas) };
         if let Some(x) = both.first() {
             let message = format!(
-                "people get to both sides of the line at {}; each floor lies on one side of its line: close the walls around it, or swap the ends \
-                 of to, if the other floor lies on the wrong side",
+                "people get to both sides of the line at {}; each floor lies on one side of its line: end the line at its jambs, close the walls \
+                 around it, or swap the ends of to, if the other floor lies on the wrong side",
                 at(*x)
             );
             builder.issues.push(Issue::new(format!("plan \"{}\".link", thing.name), message));
         }
+        words.smoke.iter().for_each(|gas| builder.exchange.ask(gas, "smoke"));
         let settings = Settings {
             name: plan.name.clone(),
             substeps: plan.substeps,
             step: plan.step,
             model,
             frailty: (!scene.body.is_empty()).then(|| frailty(&words, flat(scene).is_some())),
+            smoke: words.smoke.clone().map(|gas| Smoke::new(gas, words.extinction.unwrap_or(EXTINCTION), flat(scene).is_some())),
             flat: flat(scene).is_some(),
             mass: words.mass.unwrap_or(MASS),
             plan: thing.name.clone(),
