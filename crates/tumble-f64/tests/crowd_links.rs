@@ -78,11 +78,15 @@ fn people_come_down_two_floors_in_millimetres_by_timed_doors() {
         + &gate("door", "half way", [2500.0, 10000.0], [2500.0, 12000.0])
         + "opens = 10
 ";
-    let words = plan(walls, &(gates + &stairs)).replace("walls =", "scale = 0.001
-walls =")
-        + &crowd("area = [[1, 20.3], [4, 21.7]]
+    let words = plan(walls, &(gates + &stairs)).replace(
+        "walls =",
+        "scale = 0.001
+walls =",
+    ) + &crowd(
+        "area = [[1, 20.3], [4, 21.7]]
 count = 12
-rate = 2");
+rate = 2",
+    );
     let mut sim = scene(&words);
     empty(&mut sim, 60.0, |sim| {
         apart(sim);

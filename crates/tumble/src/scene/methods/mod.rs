@@ -250,8 +250,9 @@ pub fn late_carriers(scene: &Scene, index: usize, gases: &[String]) -> Vec<Warni
         let gas = scene.gas.iter().find(|gas| gas.name == *name)?;
         let later = place(&scene.system, "gas", gas.system.as_deref()).filter(|later| *later > index)?;
         let (own, other) = (&scene.system[index].name, &scene.system[later].name);
-        let message =
-            format!("comes before \"{other}\", whose gas acts on it, and sees it as it was at the beginning of each exchange; put it behind");
+        let message = format!(
+            "comes before \"{other}\", whose gas acts on it, and sees it as it was at the beginning of each exchange; put it behind"
+        );
         Some(Warning::new(Code::LateCarrier, format!("system \"{own}\""), message))
     };
     gases.iter().filter_map(late).collect()

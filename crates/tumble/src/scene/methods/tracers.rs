@@ -52,7 +52,7 @@ impl MethodRules for Rules {
         if scene.field.is_empty() && there {
             warnings.push(Warning::new(Code::IdleTracers, "", "tracers have no [[field]] to follow, and stay where they are; add one"));
         }
-        for (index, plan) in scene.system.iter().enumerate().filter(|(_, plan)| plan.method == Method::Tracers) {
+        for (index, _) in scene.system.iter().enumerate().filter(|(_, plan)| plan.method == Method::Tracers) {
             warnings.extend(late_carriers(scene, index, &fluids(scene).cloned().collect::<Vec<_>>()));
         }
         warnings

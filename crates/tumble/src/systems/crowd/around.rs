@@ -86,6 +86,8 @@ pub struct Other {
     pub id: u32,
     /// Its row.
     pub row: u32,
+    /// Whether it is on another floor, and seen through a link.
+    pub is_beyond: bool,
 }
 
 /// Somebody near.
@@ -115,9 +117,9 @@ pub struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// Whether no wall is between here and a place that far away.
-    pub fn sees(&self, r: Point) -> bool {
-        self.walls.is_empty() || self.plan.sees(self.walls, self.me.x, along(self.me.x, 1.0, r))
+    /// Whether no wall is between here and another.
+    pub fn sees(&self, Neighbour { r, other, .. }: &Neighbour<'_>) -> bool {
+        other.is_beyond || self.walls.is_empty() || self.plan.sees(self.walls, self.me.x, along(self.me.x, 1.0, *r))
     }
 
     /// From here to the nearest place of each wall and body near [m], and its length.
@@ -149,11 +151,11 @@ impl Around<'_> {
     /// Room ahead in a direction [m].                                                                 (crowds.4)
     pub fn room(&self, e: Point) -> f64 {
         let mut room = f64::INFINITY;
-        for Neighbour { r, d, other } in self.others {
+        for them @ Neighbour { r, d, other } in self.others {
             let reach = self.me.radius + other.radius;
             let ahead = dot(e, *r);
             let gap = d - reach;
-            if ahead > 0.0 && cross(e, *r).abs() <= reach && gap < room && !self.goes_first(*r, other) && self.sees(*r) {
+            if ahead > 0.0 && cross(e, *r).abs() <= reach && gap < room && !self.goes_first(*r, other) && self.sees(them) {
                 room = gap;
             }
         }

@@ -1,6 +1,6 @@
 //! A plan with the ways across it, and which of its gates are open when.
 
-use super::plan::{Gate, Plan, Point, middle};
+use super::plan::{Plan, Point, middle};
 use super::way::{Cells, Grid, Target, Way};
 
 /// How far from a gate people are near it [m].

@@ -2,8 +2,7 @@
 //!
 //! The plane is cut along both lines and joined crosswise: whoever crosses one goes on beyond the other, and sees who is there.
 
-use super::around::Person;
-use super::plan::{Line, Plan, Point, along, cross, dot, length, meets, middle, nearest, sub};
+use super::line::{Line, Point, along, cross, dot, length, middle, sub};
 
 /// The way through a link from one of its lines to the other: the motion that lays the first on the second, end on end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,32 +71,6 @@ impl Passage {
     pub fn before(&self, x: Point) -> Point {
         let r = sub(x, middle(self.to));
         along(middle(self.from), 1.0, [self.turn[0] * r[0] + self.turn[1] * r[1], self.turn[0] * r[1] - self.turn[1] * r[0]])
-    }
-}
-
-/// Somebody near a line of a link, as seen from beyond the other.
-#[derive(Debug)]
-pub struct Image {
-    /// The row of whom.
-    pub row: u32,
-    pub passage: Passage,
-    /// Where it seems to be.
-    pub x: Point,
-}
-
-/// Images of all who are so near a line of a link [m].
-pub fn images(people: &[Person], plan: &Plan, reach: f64) -> impl Iterator<Item = Image> {
-    let linked = if plan.passages().is_empty() { &[] } else { people };
-    linked.iter().enumerate().flat_map(move |(row, p)| {
-        let near = plan.passages_near(p.x).filter(move |passage| length(sub(p.x, nearest(passage.from, p.x))) < reach);
-        near.map(move |passage| Image { row: row as u32, passage: *passage, x: passage.place(p.x) })
-    })
-}
-
-impl Image {
-    /// Whether it is seen from a place: through the line, and past the walls around whom it is of, who is at x.
-    pub fn is_seen(&self, plan: &Plan, from: Point, x: Point) -> bool {
-        meets(self.passage.to, from, self.x) && plan.sees(plan.near(x), self.passage.before(from), x)
     }
 }
 

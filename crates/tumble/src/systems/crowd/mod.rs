@@ -7,7 +7,9 @@ mod arrivals;
 mod bodies;
 mod figure;
 mod floor;
+mod image;
 mod journey;
+mod line;
 mod link;
 mod models;
 mod near;
@@ -87,7 +89,11 @@ impl Crowd {
     pub fn new(settings: Settings, floor: Floor, people: Vec<Person>, arrivals: Vec<Arrivals>) -> Self {
         let mut all: Vec<Person> = people.iter().chain(arrivals.iter().flat_map(|a| a.people.iter().map(|(_, p)| p))).copied().collect();
         all.sort_by_key(|p| p.id);
-        Self { walk: Walk::new(floor, (settings.model, settings.frailty, settings.smoke.clone()), settings.journeys.clone(), people, arrivals), settings, all }
+        Self {
+            walk: Walk::new(floor, (settings.model, settings.frailty, settings.smoke.clone()), settings.journeys.clone(), people, arrivals),
+            settings,
+            all,
+        }
     }
 
     /// Rows of a crowd.

@@ -3,7 +3,7 @@
 use super::around::{Around, Neighbour, Other, Person};
 use super::bodies::Bodies;
 use super::floor::Floor;
-use super::link::{self, Image};
+use super::image::{self, Image};
 use super::models::{Model, Motion};
 use super::near::Near;
 use super::plan::{Point, along, crossing, dot, length, sub};
@@ -65,7 +65,7 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, air: &Air<'_>, 
     let touched = 2.0 * (most(|p| p.radius) + h * most(|p| p.speed + length(p.slide)));
     let Scratch { images, near, sorted, own, moves } = scratch;
     images.clear();
-    images.extend(link::images(people, &floor.plan, range));
+    images.extend(image::images(people, &floor.plan, range));
     near.sort(0.5 * range, people.iter().map(|p| p.x).chain(images.iter().map(|image| image.x)));
     sorted.resize(near.order.len(), Other::default());
     own.resize(near.order.len(), Move::default());
@@ -79,7 +79,7 @@ pub fn step(people: &mut [Person], floor: &Floor, model: &Model, air: &Air<'_>, 
             let p = &all[image.map_or(*row, |image| image.row) as usize];
             let (x, e, v) = (p.x, [cos(p.heading), sin(p.heading)], p.v);
             let (x, e, v) = image.map_or((x, e, v), |Image { x, passage, .. }| (*x, passage.direction(e), passage.direction(v)));
-            *other = Other { x, radius: p.radius, e, v, phi: p.phi, lies: p.lies, id: p.id, row: *row };
+            *other = Other { x, radius: p.radius, e, v, phi: p.phi, lies: p.lies, id: p.id, row: *row, is_beyond: image.is_some() };
         }
     });
     let (near, sorted) = (&*near, &*sorted);

@@ -58,9 +58,8 @@ impl Smoke {
         let eyes: Vec<[f64; 3]> = places.map(|[x, y]| [x, y, if self.flat { 0.0 } else { EYES }]).collect();
         let Some(density) = self.density.as_ref().and_then(|density| density.parts.first()) else { return Vec::new() };
         let grid = density.grid;
-        let within = |x: &[f64; 3]| {
-            (0..3).all(|a| grid.flat == Some(a) || (0.0..=grid.n[a] as f64 * grid.dx).contains(&(x[a] - grid.origin[a])))
-        };
+        let within =
+            |x: &[f64; 3]| (0..3).all(|a| grid.flat == Some(a) || (0.0..=grid.n[a] as f64 * grid.dx).contains(&(x[a] - grid.origin[a])));
         let values = sample(density, &eyes, Interpolation::Linear).unwrap_or_default();
         let of = |(x, value): (&[f64; 3], crate::math::Real)| if within(x) { self.extinction * f64::from(value).max(0.0) } else { 0.0 };
         eyes.iter().zip(values).map(of).collect()

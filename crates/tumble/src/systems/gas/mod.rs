@@ -25,6 +25,7 @@ pub use sources::{Cover, Source};
 use crate::exchange::Turn;
 use crate::fluids::hold;
 use crate::integrators::equal_steps;
+use crate::state::Vectors;
 use crate::system::{Archive, System};
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
 use tumble_interface::{Column, StepError};

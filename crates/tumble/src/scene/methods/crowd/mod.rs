@@ -222,7 +222,8 @@ fn apart(v: Line, w: Line) -> f64 {
 
 /// Links whose lines are not one place, or so near a gate or each other that a step crosses both.
 fn check_links(thing: &Floors, issues: &mut Vec<Issue>) {
-    let ends = links(thing).into_iter().flat_map(|(path, _, lines)| ["from", "to"].map(|key| format!("{path}.{key}")).into_iter().zip(lines));
+    let ends =
+        links(thing).into_iter().flat_map(|(path, _, lines)| ["from", "to"].map(|key| format!("{path}.{key}")).into_iter().zip(lines));
     let ends: Vec<(String, Line)> = ends.collect();
     for pair in ends.chunks_exact(2) {
         let ([from, to], path) = ([width(pair[0].1), width(pair[1].1)], &pair[1].0);

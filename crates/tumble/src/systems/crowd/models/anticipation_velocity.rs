@@ -53,8 +53,8 @@ fn direction(around: &Around<'_>, e: Point) -> Point {
     let me = around.me;
     let now = around.e;
     let mut aside = 0.0;
-    for Neighbour { r, d, other } in around.others {
-        if (dot(now, *r) <= 0.0 && dot(e, *r) <= 0.0) || *d == 0.0 || !around.sees(*r) {
+    for them @ Neighbour { r, d, other } in around.others {
+        if (dot(now, *r) <= 0.0 && dot(e, *r) <= 0.0) || *d == 0.0 || !around.sees(them) {
             continue;
         }
         let then = along(*r, AHEAD, other.v);

@@ -66,7 +66,7 @@ fn turn(around: &Around<'_>, e: Point) -> f64 {
     for them in around.others {
         let (ahead, aside) = (dot(e, them.r), cross(e, them.r));
         let q = ahead / DECAY[0] + aside.abs() / DECAY[1];
-        if ahead > 0.0 && q < least.0 && around.sees(them.r) {
+        if ahead > 0.0 && q < least.0 && around.sees(them) {
             least = (q, aside);
         }
     }

@@ -54,8 +54,7 @@ impl Orca {
             }
         }
         let walls = planes.len();
-        planes
-            .extend(around.others.iter().filter(|them| them.d > 0.0 && around.sees(them.r)).map(|them| self.keeps_clear(around, them, h)));
+        planes.extend(around.others.iter().filter(|them| them.d > 0.0 && around.sees(them)).map(|them| self.keeps_clear(around, them, h)));
         let v = match nearest(&planes, around.speed, desired, false) {
             Ok(v) => v,
             Err((failed, v)) => safest(&planes, walls, failed, around.speed, v),

@@ -70,7 +70,7 @@ impl SocialForce {
                 a = along(a, -CONTACT[0] * overlap / self.mass, n);
                 a = along(a, CONTACT[1] * overlap / self.mass * dot(sub(other.v, me.v), side), side);
             }
-            if !around.goes_first(*r, other) && around.sees(*r) {
+            if !around.goes_first(*r, other) && around.sees(them) {
                 a = along(a, 1.0, at_a_distance(me.v, them));
             }
         }
