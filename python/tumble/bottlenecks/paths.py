@@ -83,7 +83,7 @@ def _leap(plan: Any) -> float:
 
 
 def _parted(rows: list[tuple[int, int, float, float]], leap: float) -> list[tuple[int, int, float, float]]:
-    """Ways, sorted by person and frame, with a new person where one leaps to another floor: lines between there are not crossed."""
+    """Ways, sorted by person and frame, with a new person on each floor: lines between there are not crossed."""
     parted, new, last = [], max((row[0] for row in rows), default=0), (-1, -1)
     for k, row in enumerate(rows):
         if k and rows[k - 1][0] == row[0] and math.dist(rows[k - 1][2:], row[2:]) > leap:
