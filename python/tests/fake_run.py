@@ -78,10 +78,10 @@ class FakeRun:
                 plane = tuple(point), tuple((up / np.linalg.norm(up)).tolist())
             own = start.get(name, {})
             few = "id" not in own and len(own.get("position", ())) < 200
-            side = next((s["vicsek"]["side"] for s in self.scene["system"] if "vicsek" in s), None)
+            leap = next((0.5 * s["vicsek"]["side"] for s in self.scene["system"] if "vicsek" in s), None)
             radius = float(np.ravel(columns.get("radius", 0.01))[0])
             trail = entry.get("trail", 0.0)
-            found.append(Look(name, form, color, radius, trail, side, plane, entry.get("render", 1), few))
+            found.append(Look(name, form, color, radius, trail, leap, plane, entry.get("render", 1), few))
         ends = [[end.rsplit(" ", 1) for end in anchor["between"]] for anchor in self.scene.get("anchor", ())]
         return Looks(tuple(found), tuple(((a, int(i)), (b, int(j))) for (a, i), (b, j) in ends))
 
