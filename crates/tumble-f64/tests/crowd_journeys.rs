@@ -2,8 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-use crate::common::{positions, run, step, velocities};
-use crate::crowds::{FPS, apart, crowd, empty, gate, gates, people, plan, scene, text};
+use crate::common::{positions, step, velocities};
+use crate::crowds::{FPS, apart, crowd, empty, gate, gates, people, plan, same_bits, scene, text};
 use tumble_f64::scene::Simulation;
 use tumble_interface::{Assets, Engine, Scene};
 
@@ -180,24 +180,8 @@ fn the_same_bits_on_any_count_of_threads_and_after_a_restore_with_journeys() {
         + "[[plan.waypoint]]\nname = \"desk\"\nat = [5, 6]\n"
         + &crowd("area = [[1, 0.5], [6, 4]]\ncount = 60\ngoals = [\"desk\"]\nchoice = \"quickest\"\nspeed_spread = 0.3")
         + "[[crowd]]\nname = \"later\"\narea = [[6, 0.5], [9, 3]]\ncount = 40\nrate = 3\npreset = \"rimea\"\nchoice = \"quickest\"\n";
-    let on = |threads: usize, at: Option<usize>| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
-            let mut sim = scene(&words);
-            run(&mut sim, at.unwrap_or(0));
-            if at.is_some() {
-                let saved = sim.save(&[]);
-                sim = scene(&words);
-                sim.restore(&saved).unwrap();
-            }
-            run(&mut sim, 240 - at.unwrap_or(0));
-            (sim.hash(), sim.ledger().left)
-        })
-    };
-    let one = on(1, None);
-    assert!(one.1.unwrap() > 5);
-    for (threads, at) in [(3, None), (1, Some(100)), (2, Some(170))] {
-        assert_eq!(on(threads, at), one, "{threads} threads, {at:?}");
-    }
+    let sim = same_bits(&words, 240, &[(3, None), (1, Some(100)), (2, Some(170))]);
+    assert!(sim.ledger().left.unwrap() > 5);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
 use crate::common::{positions, run, velocities};
-use crate::crowds::{FPS, apart, crowd, gate, plan, scene, text};
+use crate::crowds::{FPS, apart, crowd, gate, plan, same_bits, scene, text};
 use tumble_f64::scene::Simulation;
 use tumble_interface::{Assets, Engine, Scene};
 
@@ -66,23 +66,36 @@ fn people_in_smoke_see_each_other_late_and_do_not_overlap() {
 #[test]
 fn people_in_smoke_have_the_same_bits_on_any_count_of_threads_and_after_a_restore() {
     let words = corridor(3.0, &crowd("area = [[0, 0], [19, 0.6]]\ncount = 20"));
-    let on = |threads: usize, at: Option<usize>| {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
-            let mut sim = scene(&words);
-            run(&mut sim, at.unwrap_or(0));
-            if at.is_some() {
-                let saved = sim.save(&[]);
-                sim = scene(&words);
-                sim.restore(&saved).unwrap();
-            }
-            run(&mut sim, 60 - at.unwrap_or(0));
-            sim.hash()
-        })
+    same_bits(&words, 60, &[(3, None), (2, Some(31))]);
+}
+
+#[test]
+fn people_see_the_smoke_of_an_earlier_system_and_are_told_of_a_later_one() {
+    let words = corridor(1.0, &walker(0.0));
+    let late = |sim: &Simulation| sim.warnings().iter().filter(|w| w.code.name() == "late-carrier").count();
+    assert_eq!(late(&scene(&words)), 0);
+    let [gas, crowd] = [
+        "[[system]]\nname = \"air flow\"\nmethod = \"gas\"\n",
+        "[[system]]\nname = \"walkers\"\nmethod = \"crowd\"\ncrowd = { smoke = \"air\" }\n",
+    ];
+    assert!(words.contains(&[gas, crowd].concat()));
+    assert_eq!(late(&scene(&words.replace(&[gas, crowd].concat(), &[crowd, gas].concat()))), 1);
+}
+
+#[test]
+fn in_space_the_smoke_at_eye_level_counts() {
+    // A layer of smoke above 1 m, and one below: people walk in the one, and over the other.
+    let gone = |layer: &str| {
+        let words = corridor(4.0, &walker(0.0))
+            .replace("size = [21, 2, 1], center = [9.5, 0.3, 0]", "size = [21, 2, 2], center = [9.5, 0.3, 1]")
+            .replace(&format!("initial = \"{}\"", 4.0 / 8700.0), &format!("initial = \"{}*{layer}\"", 4.0 / 8700.0));
+        let mut sim = crate::common::simulation(&text(&words).replace("dimension = 2\nplane = \"xy\"\n", ""));
+        run(&mut sim, (5.0 * FPS) as usize);
+        positions(&sim, "people")[0].x
     };
-    let one = on(1, None);
-    for (threads, at) in [(3, None), (2, Some(31))] {
-        assert_eq!(on(threads, at), one, "{threads} threads, {at:?}");
-    }
+    let (within, over) = (gone("step(1, z)"), gone("step(z, 1)"));
+    assert!((within / (6.65 * (1.0 - 4.0 * 0.057 / 0.706)) - 1.0).abs() < 0.005, "{within}");
+    assert!((over / 6.65 - 1.0).abs() < 0.005, "{over}");
 }
 
 #[test]

@@ -60,6 +60,29 @@ pub fn apart(sim: &Simulation) {
     assert!(deepest < 1e-9, "{deepest} m at {} s", sim.time());
 }
 
+/// Hashes and ledgers after some frames are the same on any count of threads, and after a restore at a frame; the people who are there at the end.
+pub fn same_bits(words: &str, frames: usize, others: &[(usize, Option<usize>)]) -> Simulation {
+    let on = |threads: usize, at: Option<usize>| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+            let mut sim = scene(words);
+            run(&mut sim, at.unwrap_or(0));
+            if at.is_some() {
+                let saved = sim.save(&[]);
+                sim = scene(words);
+                sim.restore(&saved).unwrap();
+            }
+            run(&mut sim, frames - at.unwrap_or(0));
+            sim
+        })
+    };
+    let one = on(1, None);
+    for (threads, at) in others {
+        let other = on(*threads, *at);
+        assert_eq!((other.hash(), other.ledger().left), (one.hash(), one.ledger().left), "{threads} threads, {at:?}");
+    }
+    one
+}
+
 /// A room 16 m long and 8 m wide with a door of this width at its right end, and an exit 3 m behind.
 pub fn bottleneck(width: f64, people: &str) -> String {
     let (a, b) = (4.0 - 0.5 * width, 4.0 + 0.5 * width);
