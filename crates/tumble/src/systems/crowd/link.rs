@@ -76,7 +76,7 @@ impl Passage {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{CollisionFreeSpeed, Floor, Gate, Goal, Model, Person, Plan, journeys, walk::Walk};
+    use super::super::{AnticipationVelocity, CollisionFreeSpeed, Floor, Gate, Goal, Model, Person, Plan, journeys, walk::Walk};
     use super::*;
 
     fn exit(name: &str, line: Line) -> Gate {
@@ -85,7 +85,7 @@ mod tests {
 
     /// People in a corridor 12 m x 3 m who walk to the exit at its other end, after some steps: places, and who has left. Its far half is drawn
     /// elsewhere, by a motion, if there is one.
-    fn corridor(moved: Option<fn(Point) -> Point>, people: &[(Point, usize)], steps: usize) -> Vec<(u32, Point)> {
+    fn corridor(model: Model, moved: Option<fn(Point) -> Point>, people: &[(Point, usize)], steps: usize) -> Vec<(u32, Point)> {
         let far = |x: Point| moved.map_or(x, |moved| moved(x));
         let cut = [[6.0, 0.0], [6.0, 3.0]];
         let halves = [[[0.0, 0.0], [6.0, 0.0]], [[0.0, 3.0], [6.0, 3.0]]];
@@ -95,7 +95,6 @@ mod tests {
         let gates = vec![exit("left", [[0.0, 0.0], [0.0, 3.0]]), exit("right", [[12.0, 0.0], [12.0, 3.0]].map(far))];
         let links: Vec<[Line; 2]> = moved.into_iter().map(|moved| [cut, cut.map(moved)]).collect();
         let (legs, targets) = journeys([0, 1].map(|exit| (vec![Goal::Exits(vec![exit])], false)).to_vec());
-        let model = Model::CollisionFreeSpeed(CollisionFreeSpeed { time_gap: 0.65, buffer: 0.04 });
         let floor = Floor::new(Plan::new(walls, gates, 3.0).with_links(&links), targets, 0.1, 0.22);
         let person = |(id, (x, way)): (usize, &(Point, usize))| {
             let stands = id >= people.len();
@@ -142,13 +141,16 @@ mod tests {
         let shifted: fn(Point) -> Point = |[x, y]| [x + 20.0, y];
         let turned: fn(Point) -> Point = |[x, y]| [30.0 - y, x + 4.0];
         // Where bodies touch, their order counts, and it is that of the drawing.
-        for (people, steps, across) in [(meeting, 50, 0), (following, 25, 3)] {
-            let whole = corridor(None, &people, steps);
+        let speed = Model::CollisionFreeSpeed(CollisionFreeSpeed { time_gap: 0.65, buffer: 0.04 });
+        // It heeds where others go.
+        let ahead = Model::AnticipationVelocity(AnticipationVelocity { time_gap: 0.5, buffer: 0.04 });
+        for (model, people, steps, across) in [(speed, &meeting, 50, 0), (speed, &following, 25, 3), (ahead, &meeting, 50, 0)] {
+            let whole = corridor(model, None, people, steps);
             let crossed = whole.iter().filter(|(id, [x, _])| (*x > 6.0) != (people[*id as usize].0[0] > 6.0)).count();
             assert!(crossed >= across && whole.len() == people.len(), "{crossed}");
             assert!(whole.iter().any(|(id, [_, y])| (y - people[*id as usize].0[1]).abs() > 0.05));
             for moved in [shifted, turned] {
-                let parted = corridor(Some(moved), &people, steps);
+                let parted = corridor(model, Some(moved), people, steps);
                 assert_eq!(parted.len(), whole.len());
                 for ((_, x), (_, y)) in parted.into_iter().zip(&whole) {
                     let y = if y[0] > 6.0 { moved(*y) } else { *y };
